@@ -1,0 +1,47 @@
+"""Materials."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+from taichifem.description import check
+
+MODELS = ("linear", "corotational")
+
+
+@dataclass(frozen=True, kw_only=True)
+class Material:
+    """An isotropic elastic material.
+
+    model: "corotational" (Mueller & Gross 2004) or "linear" (small strain; swells when it turns).
+    youngs: Young's modulus E [Pa], above 0.  poisson: ratio nu, above -1 and below 0.5.
+    density: [kg/m^3], above 0.
+    mass_damping: Rayleigh alpha [1/s], slows every motion.  stiffness_damping: Rayleigh beta [s], slows
+    deformation only.
+    Raises InputError for values outside these bounds.
+    """
+
+    model: str = "corotational"
+    youngs: float = 1e6
+    poisson: float = 0.4
+    density: float = 1000.0
+    mass_damping: float = 0.0
+    stiffness_damping: float = 0.0
+
+    def __post_init__(self) -> None:
+        check.choice("model", self.model, MODELS)
+        check.number("youngs", self.youngs, above=0, unit="Pa")
+        check.number("poisson", self.poisson, above=-1, below=0.5)
+        check.number("density", self.density, above=0, unit="kg/m^3")
+        check.number("mass_damping", self.mass_damping, at_least=0, unit="1/s")
+        check.number("stiffness_damping", self.stiffness_damping, at_least=0, unit="s")
+
+    @property
+    def shear_modulus(self) -> float:
+        """Second Lame parameter mu = E / (2 (1 + nu)) [Pa]."""
+        return self.youngs / (2 * (1 + self.poisson))
+
+    @property
+    def lame_lambda(self) -> float:
+        """First Lame parameter lambda = E nu / ((1 + nu) (1 - 2 nu)) [Pa]."""
+        return self.youngs * self.poisson / ((1 + self.poisson) * (1 - 2 * self.poisson))

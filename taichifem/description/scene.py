@@ -1,0 +1,154 @@
+"""Bodies and the scene they live in."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from taichifem.description import check
+from taichifem.description.colliders import Collider
+from taichifem.description.material import Material
+from taichifem.description.motion import Motion, rotation_matrix
+from taichifem.description.regions import Region
+from taichifem.description.view import Camera, View
+from taichifem.errors import InputError
+from taichifem.mesh import TetMesh
+
+INTEGRATORS = ("backward-euler", "backward-euler-newton")
+
+
+@dataclass(frozen=True, kw_only=True)
+class Pin:
+    """Holds the nodes of `region` (world coordinates at rest), or moves them along `motion`.
+
+    axes: which of "xyz" are held; the others stay free.
+    until: time [s] at which the nodes are let go; None holds them for ever.
+    """
+
+    region: Region
+    motion: Motion | None = None
+    axes: str = "xyz"
+    until: float | None = None
+
+    def __post_init__(self) -> None:
+        if not self.axes or set(self.axes) - set("xyz") or len(set(self.axes)) != len(self.axes):
+            raise InputError(f'axes is {self.axes!r}: give some of "xyz", each once')
+        if self.until is not None:
+            check.number("until", self.until, at_least=0, unit="s")
+
+
+@dataclass(frozen=True, kw_only=True)
+class Handle:
+    """Pulls the nodes of `region` towards their rest position moved along `motion`, by an implicit spring.
+
+    stiffness: of the whole handle [N/m], shared equally by its nodes.
+    start, until: times [s] between which it pulls; until None pulls for ever.
+    """
+
+    region: Region
+    motion: Motion = field(default_factory=Motion)
+    stiffness: float = 1e3
+    start: float = 0.0
+    until: float | None = None
+
+    def __post_init__(self) -> None:
+        check.number("stiffness", self.stiffness, above=0, unit="N/m")
+        check.number("start", self.start, at_least=0, unit="s")
+        if self.until is not None:
+            check.number("until", self.until, above=self.start, unit="s")
+
+
+@dataclass(frozen=True, kw_only=True)
+class Body:
+    """A solid: a mesh, what it is made of, where it starts, and how it is held.
+
+    mesh: the shape at rest, before placement.
+    material: of all elements;  materials: replaces it where the mesh's region has that number.
+    scale, then a turn by `angle` [degrees] about `axis` through the origin, then `position` [m] place it.
+    velocity: at the start [m/s].  spin: angular velocity at the start [rad/s], about the centre of the nodes.
+    pins: regions to hold, or Pin objects.  handles: springs that pull.
+    """
+
+    mesh: TetMesh
+    material: Material = field(default_factory=Material)
+    materials: Mapping[int, Material] = field(default_factory=dict)
+    name: str = ""
+    scale: float = 1.0
+    axis: check.Vector = (0.0, 0.0, 1.0)
+    angle: float = 0.0
+    position: check.Vector = (0.0, 0.0, 0.0)
+    velocity: check.Vector = (0.0, 0.0, 0.0)
+    spin: check.Vector = (0.0, 0.0, 0.0)
+    pins: Sequence[Region | Pin] = ()
+    handles: Sequence[Handle] = ()
+
+    def __post_init__(self) -> None:
+        check.number("scale", self.scale, above=0)
+        if not np.linalg.norm(check.vector("axis", self.axis)) > 0:
+            raise InputError("axis is (0, 0, 0): give a direction")
+        check.number("angle", self.angle, unit="degrees")
+        check.vector("position", self.position, unit="m")
+        check.vector("velocity", self.velocity, unit="m/s")
+        check.vector("spin", self.spin, unit="rad/s")
+        unknown = sorted(set(self.materials) - set(np.unique(self.mesh.regions).tolist()))
+        if unknown:
+            known = np.unique(self.mesh.regions).tolist()
+            raise InputError(f"materials names region {unknown[0]}, but the mesh has only {known}")
+
+    def placed_points(self) -> np.ndarray:
+        """Rest positions of the nodes in the world (n,3) [m]."""
+        turned = self.scale * self.mesh.points @ rotation_matrix(self.axis, self.angle).T
+        return turned + np.asarray(self.position, dtype=float)
+
+
+@dataclass(frozen=True, kw_only=True)
+class Scene:
+    """Everything that is simulated, and how. SI units, z points up.
+
+    gravity: [m/s^2].  fps: frames a second.  substeps: time steps a frame, so dt = 1 / (fps substeps).
+    seconds: how long `taichifem run` goes on.
+    integrator: "backward-euler" (one linearisation a step) or "backward-euler-newton" (to convergence).
+    tolerance: relative residual at which the linear solver stops.  max_iterations: its cap, told when hit.
+    """
+
+    bodies: Sequence[Body]
+    colliders: Sequence[Collider] = ()
+    gravity: check.Vector = (0.0, 0.0, -9.81)
+    fps: float = 60
+    substeps: int = 1
+    seconds: float = 5.0
+    integrator: str = "backward-euler"
+    tolerance: float = 1e-3
+    max_iterations: int = 2000
+    name: str = "scene"
+    description: str = ""
+    camera: Camera = field(default_factory=Camera)
+    view: View = field(default_factory=View)
+
+    def __post_init__(self) -> None:
+        if not len(self.bodies):
+            raise InputError("the scene has no body: add at least one")
+        check.vector("gravity", self.gravity, unit="m/s^2")
+        check.number("fps", self.fps, above=0, unit="1/s")
+        check.whole("substeps", self.substeps)
+        check.number("seconds", self.seconds, above=0, unit="s")
+        check.choice("integrator", self.integrator, INTEGRATORS)
+        check.number("tolerance", self.tolerance, above=0, below=1)
+        check.whole("max_iterations", self.max_iterations)
+
+    @property
+    def dt(self) -> float:
+        """Time step [s]."""
+        return 1.0 / (self.fps * self.substeps)
+
+    @classmethod
+    def from_file(cls, path: str, *, overrides: Sequence[str] = ()) -> Scene:
+        """Read a scene file (TOML); `overrides` are "body.0.material.youngs=2e5" and the like.
+
+        Raises InputError naming the file, the key and the remedy.
+        """
+        from taichifem.scene import read_scene  # the one look upstairs, for a short name people can call
+
+        return read_scene(path, overrides=overrides)
