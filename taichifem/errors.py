@@ -6,3 +6,7 @@ class InputError(ValueError):
 
     The command line prints it without a traceback and exits with code 2.
     """
+
+
+class Diverged(InputError):
+    """The simulation met numbers that are not finite. The state before the step can still be written."""

@@ -47,9 +47,7 @@ class Motion:
             raise InputError(f"times {list(times)} must increase, with at least one entry")
         for name, keys in (("translation", self.translation), ("angle", self.angle)):
             if len(keys) not in (0, len(times)):
-                raise InputError(
-                    f"{name} has {len(keys)} entries for {len(times)} times: give one for each time"
-                )
+                raise InputError(f"{name} has {len(keys)} entries for {len(times)} times: give one for each time")
         for k, vector in enumerate(self.translation):
             check.vector(f"translation[{k}]", vector, unit="m")
         check.numbers("angle", self.angle)

@@ -111,6 +111,7 @@ class Scene:
     seconds: how long `taichifem run` goes on.
     integrator: "backward-euler" (one linearisation a step) or "backward-euler-newton" (to convergence).
     tolerance: relative residual at which the linear solver stops.  max_iterations: its cap, told when hit.
+    newton_tolerance: size of the out-of-balance force, relative to the first, at which Newton's method stops.
     """
 
     bodies: Sequence[Body]
@@ -122,6 +123,7 @@ class Scene:
     integrator: str = "backward-euler"
     tolerance: float = 1e-3
     max_iterations: int = 2000
+    newton_tolerance: float = 1e-6
     name: str = "scene"
     description: str = ""
     camera: Camera = field(default_factory=Camera)
@@ -137,6 +139,7 @@ class Scene:
         check.choice("integrator", self.integrator, INTEGRATORS)
         check.number("tolerance", self.tolerance, above=0, below=1)
         check.whole("max_iterations", self.max_iterations)
+        check.number("newton_tolerance", self.newton_tolerance, above=0, below=1)
 
     @property
     def dt(self) -> float:

@@ -1,0 +1,158 @@
+"""Loops over elements: rotations, elastic forces, stress and energy; and the sums at the nodes."""
+
+from taichifem.formulas import hooke, rotation
+from taichifem.runtime import ti
+
+LAMBDA, MU, MASS_DAMPING, STIFFNESS_DAMPING, DENSITY, TURNS = range(6)
+"""Columns of the material table."""
+
+
+@ti.func
+def _edges(field: ti.template(), w: ti.template(), e: ti.i32):
+    """Differences of a node field to the element's first node, as columns (3,3)."""
+    cell = w.cell[e]
+    first = field[cell[0]]
+    return ti.Matrix.cols([field[cell[1]] - first, field[cell[2]] - first, field[cell[3]] - first])
+
+
+@ti.func
+def _symmetric(m):
+    return 0.5 * (m + m.transpose())
+
+
+@ti.func
+def _plastic(w: ti.template(), e: ti.i32):
+    """Plastic strain as a matrix."""
+    p = w.plastic[e]
+    return ti.Matrix([[p[0], p[3], p[5]], [p[3], p[1], p[4]], [p[5], p[4], p[2]]])
+
+
+@ti.func
+def _strain(F, R, w: ti.template(), e: ti.i32):
+    """Elastic strain in the rotated frame: sym(R^T F) - I - eps_p."""
+    strain = _symmetric(R.transpose() @ F) - _plastic(w, e)
+    for k in ti.static(range(3)):
+        strain[k, k] -= 1
+    return strain
+
+
+@ti.func
+def _rotation(w: ti.template(), e: ti.i32, F, most: ti.i32):
+    """Rotation of element e, updated from its last one; the identity for linear materials."""
+    R = ti.Matrix.identity(w.real, 3)
+    if w.table[w.material[e]][TURNS] > 0:
+        q = rotation.nearest_rotation(F, w.rotation[e], ti.cast(ti.static(_tolerance(w.precision)), w.real), most)
+        w.rotation[e] = q
+        R = rotation.rotation_of(q)
+    return R
+
+
+def _tolerance(precision: str) -> float:
+    """Turn [rad] below which a rotation counts as found: Newton's next error is about its square."""
+    return {"f32": 2e-4, "f64": 1e-8}[precision]
+
+
+@ti.kernel
+def deform(
+    w: ti.template(),
+    n_elements: ti.i32,
+    stiffness_factor: ti.f64,
+    damping_factor: ti.f64,
+    rate_factor: ti.f64,
+    rate_damping: ti.f64,
+    most: ti.i32,
+):
+    """Rotations, forces at the corners and what the matrix needs, from positions `w.x` and velocities `w.v`.
+
+    Corner forces are -V R (sigma + sigma_rate) g_a, where the rate stress is that of the strain rate times
+    (rate_factor + rate_damping beta): the part of dt K v that linearisation brings, and the damping.
+    `w.moduli` becomes V (stiffness_factor + damping_factor beta) (lambda, mu), with beta the material's stiffness
+    damping.  most: iterations for a rotation.
+    """
+    for e in range(n_elements):
+        row = w.table[w.material[e]]
+        gradients = w.gradients[e]
+        F = _edges(w.x, w, e) @ gradients
+        R = _rotation(w, e, F, most)
+        rate = _symmetric(R.transpose() @ (_edges(w.v, w, e) @ gradients))
+        damping = row[STIFFNESS_DAMPING]
+        strain = _strain(F, R, w, e) + (ti.cast(rate_factor, w.real) + ti.cast(rate_damping, w.real) * damping) * rate
+        stress = R @ hooke.stress(strain, row[LAMBDA], row[MU])
+        volume = w.volume[e]
+        h = gradients @ R.transpose()  # rows h_1..h_3
+        f = -volume * (gradients @ stress.transpose())  # rows f_1..f_3
+        corners, forces = ti.Matrix.zero(w.real, 4, 3), ti.Matrix.zero(w.real, 4, 3)
+        for k in ti.static(range(3)):
+            corners[0, k] = -(h[0, k] + h[1, k] + h[2, k])
+            forces[0, k] = -(f[0, k] + f[1, k] + f[2, k])
+            for a in ti.static(range(3)):
+                corners[a + 1, k] = h[a, k]
+                forces[a + 1, k] = f[a, k]
+        w.h[e] = corners
+        w.corner_force[e] = forces
+        factor = ti.cast(stiffness_factor, w.real) + ti.cast(damping_factor, w.real) * damping
+        w.moduli[e] = volume * factor * ti.Vector([row[LAMBDA], row[MU]])
+
+
+@ti.func
+def gathered_force(w: ti.template(), i: ti.i32):
+    """Sum of the corner forces at node i [N], in the order of the elements."""
+    total = ti.Vector.zero(w.real, 3)
+    for k in range(w.incident_start[i], w.incident_start[i + 1]):
+        e, a = w.incident[k] >> 2, w.incident[k] & 3
+        f = w.corner_force[e]
+        total += ti.Vector([f[a, 0], f[a, 1], f[a, 2]])
+    return total
+
+
+@ti.kernel
+def gather_forces(w: ti.template(), n: ti.i32):
+    """Elastic forces `w.force` [N] at the nodes."""
+    for i in range(n):
+        w.force[i] = gathered_force(w, i)
+
+
+@ti.kernel
+def measure(w: ti.template(), n_elements: ti.i32, most: ti.i32):
+    """Cauchy stress `w.stress` [Pa] and elastic energy `w.energy` [J] of every element at `w.x`.
+
+    Corotational: P F^T / det F; where an element is flat or inside out that has no meaning, and the
+    rotated stress R sigma R^T stands in, which is the same for small strain. Linear: sigma itself.
+    """
+    for e in range(n_elements):
+        row = w.table[w.material[e]]
+        F = _edges(w.x, w, e) @ w.gradients[e]
+        R = _rotation(w, e, F, most)
+        strain = _strain(F, R, w, e)
+        sigma = hooke.stress(strain, row[LAMBDA], row[MU])
+        cauchy = R @ sigma @ R.transpose()
+        det = F.determinant()
+        if row[TURNS] > 0 and det > 0:
+            cauchy = R @ sigma @ F.transpose() / det
+        w.stress[e] = cauchy
+        w.energy[e] = w.volume[e] * hooke.energy_density(strain, row[LAMBDA], row[MU])
+
+
+@ti.kernel
+def gather_masses(w: ti.template(), n: ti.i32):
+    """Lumped mass and mass-proportional damping of the nodes, and the size of their contact springs.
+
+    A contact spring is `w.contact_stiffness` [N/m]: the trace of the node's own stiffness block at rest, which
+    no rotation changes, over 3.
+    """
+    for i in range(n):
+        mass, drag, stiffness = ti.cast(0.0, w.real), ti.cast(0.0, w.real), ti.cast(0.0, w.real)
+        for k in range(w.incident_start[i], w.incident_start[i + 1]):
+            e, a = w.incident[k] >> 2, w.incident[k] & 3
+            row = w.table[w.material[e]]
+            g = -(w.gradients[e].transpose() @ ti.Vector([1.0, 1.0, 1.0]))
+            for b in ti.static(range(3)):
+                if a == b + 1:
+                    g = ti.Vector([w.gradients[e][b, 0], w.gradients[e][b, 1], w.gradients[e][b, 2]])
+            share = row[DENSITY] * w.volume[e] / 4
+            mass += share
+            drag += share * row[MASS_DAMPING]
+            stiffness += w.volume[e] * (row[LAMBDA] + 4 * row[MU]) * g.norm_sqr() / 3
+        w.mass[i] = mass
+        w.drag[i] = drag
+        w.contact_stiffness[i] = stiffness

@@ -1,0 +1,1 @@
+"""Ways to advance time by one step."""

@@ -1,0 +1,140 @@
+"""All bodies of a scene laid out in one set of arrays. NumPy only: what the world's fields are filled from."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from taichifem.description import Body, Handle, Material, Motion, Pin, Region, Scene
+from taichifem.errors import InputError
+from taichifem.mesh import TetMesh
+
+
+@dataclass
+class Group:
+    """Nodes that follow one motion: a pin, or a handle with the stiffness [N/m] each node gets."""
+
+    nodes: np.ndarray
+    motion: Motion | None
+    start: float
+    until: float | None
+    axes: tuple[bool, bool, bool] = (True, True, True)
+    stiffness: float = 0.0
+
+    def acts_at(self, time: float) -> bool:
+        """Does it hold or pull during the step that ends at `time` [s]?"""
+        return time > self.start and (self.until is None or time <= self.until * (1 + 1e-9))
+
+
+@dataclass
+class Layout:
+    """Arrays of a whole scene. Nodes and elements of a body are a contiguous range.
+
+    rest (n,3) [m], velocities (n,3) [m/s], cells (m,4), node_bodies (n,), cell_bodies (m,), cell_materials (m,)
+    into `materials`, regions (m,), surface (k,3) outward triangles, surface_bodies (k,), body_start (bodies+1,).
+    """
+
+    rest: np.ndarray
+    velocities: np.ndarray
+    cells: np.ndarray
+    node_bodies: np.ndarray
+    cell_bodies: np.ndarray
+    cell_materials: np.ndarray
+    regions: np.ndarray
+    surface: np.ndarray
+    surface_bodies: np.ndarray
+    body_start: np.ndarray
+    materials: list[Material]
+    material_of: dict[tuple[int, int | None], int]
+    pins: list[Group] = field(default_factory=list)
+    handles: list[Group] = field(default_factory=list)
+
+    @property
+    def gradients(self) -> np.ndarray:
+        """D_m^-1 of every element (m,3,3): its rows are the shape gradients g_1..g_3 [1/m]."""
+        return np.linalg.inv(self._edges())
+
+    @property
+    def volumes(self) -> np.ndarray:
+        """Rest volumes (m,) [m^3]."""
+        return np.linalg.det(self._edges()) / 6
+
+    def _edges(self) -> np.ndarray:
+        corners = self.rest[self.cells]
+        return (corners[:, 1:] - corners[:, :1]).transpose(0, 2, 1)
+
+
+def _selected(region: Region, points: np.ndarray, first: int, where: str) -> np.ndarray:
+    nodes = region.select(points)
+    if not len(nodes):
+        low, high = points.min(axis=0).round(4).tolist(), points.max(axis=0).round(4).tolist()
+        raise InputError(f"{where} selects no node: the body spans {low} to {high} [m] in world coordinates at rest")
+    return nodes + first
+
+
+def _groups(body: Body, label: str, points: np.ndarray, first: int) -> tuple[list[Group], list[Group]]:
+    pins, handles = [], []
+    for k, entry in enumerate(body.pins):
+        pin = entry if isinstance(entry, Pin) else Pin(region=entry)
+        nodes = _selected(pin.region, points, first, f"{label}.pin.{k}")
+        axes = tuple(axis in pin.axes for axis in "xyz")
+        pins.append(Group(nodes, pin.motion, -np.inf, pin.until, axes=axes))
+    for k, handle in enumerate(body.handles):
+        if not isinstance(handle, Handle):
+            raise InputError(f"{label}.handle.{k} is a {type(handle).__name__}: give a Handle")
+        nodes = _selected(handle.region, points, first, f"{label}.handle.{k}")
+        stiffness = handle.stiffness / len(nodes)
+        handles.append(Group(nodes, handle.motion, handle.start, handle.until, stiffness=stiffness))
+    return pins, handles
+
+
+def lay_out(scene: Scene) -> Layout:
+    """Concatenate the scene's bodies. Raises InputError where a pin or handle selects nothing."""
+    rest, velocities, cells, node_bodies, cell_bodies, cell_materials = [], [], [], [], [], []
+    regions, surface, surface_bodies, body_start = [], [], [], [0]
+    materials: list[Material] = []
+    material_of: dict[tuple[int, int | None], int] = {}
+    pins, handles = [], []
+    for b, body in enumerate(scene.bodies):
+        mesh: TetMesh = body.mesh
+        points, first = body.placed_points(), body_start[-1]
+        label = f"body.{body.name or b}"
+        row = np.full(len(mesh.cells), len(materials), dtype=np.int32)
+        material_of[b, None] = len(materials)
+        materials.append(body.material)
+        for region, material in sorted(body.materials.items()):
+            material_of[b, region] = len(materials)
+            row[mesh.regions == region] = len(materials)
+            materials.append(material)
+        rest.append(points)
+        arm = points - points.mean(axis=0)
+        velocities.append(np.asarray(body.velocity) + np.cross(np.asarray(body.spin), arm))
+        cells.append(mesh.cells + first)
+        cell_materials.append(row)
+        regions.append(mesh.regions)
+        node_bodies.append(np.full(len(points), b, dtype=np.int32))
+        cell_bodies.append(np.full(len(mesh.cells), b, dtype=np.int32))
+        triangles = mesh.surface()
+        surface.append(triangles + first)
+        surface_bodies.append(np.full(len(triangles), b, dtype=np.int32))
+        held, pulled = _groups(body, label, points, first)
+        pins += held
+        handles += pulled
+        body_start.append(first + len(points))
+    return Layout(
+        rest=np.concatenate(rest),
+        velocities=np.concatenate(velocities),
+        cells=np.concatenate(cells).astype(np.int32),
+        node_bodies=np.concatenate(node_bodies),
+        cell_bodies=np.concatenate(cell_bodies),
+        cell_materials=np.concatenate(cell_materials),
+        regions=np.concatenate(regions),
+        surface=np.concatenate(surface).astype(np.int32),
+        surface_bodies=np.concatenate(surface_bodies),
+        body_start=np.asarray(body_start, dtype=np.int32),
+        materials=materials,
+        material_of=material_of,
+        pins=pins,
+        handles=handles,
+    )

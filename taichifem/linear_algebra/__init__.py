@@ -1,0 +1,1 @@
+"""The block matrix, its pattern, and the solver."""

@@ -1,0 +1,1 @@
+"""What acts on the bodies besides elasticity: what holds and pulls them, and contact."""

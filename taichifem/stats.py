@@ -1,0 +1,45 @@
+"""What is known about a step: sizes, time per phase, solver, energies and momenta."""
+
+from __future__ import annotations
+
+from dataclasses import asdict, dataclass, field
+
+
+@dataclass(frozen=True)
+class Stats:
+    """Figures after a step; SI units, times of phases in milliseconds.
+
+    energy: kinetic, elastic, gravity (zero at the origin) and their total [J].
+    momentum [kg m/s]; angular_momentum about the origin [kg m^2/s].
+    residual: of the last linear solve, relative; converged: False if the iteration cap was hit.
+    """
+
+    time: float
+    frame: int
+    step: int
+    nodes: int
+    elements: int
+    ms: dict[str, float] = field(default_factory=dict)
+    ms_per_step: float = 0.0
+    iterations: int = 0
+    residual: float = 0.0
+    converged: bool = True
+    contact_passes: int = 0
+    linearisations: int = 0
+    contacts: int = 0
+    energy: dict[str, float] = field(default_factory=dict)
+    momentum: tuple[float, float, float] = (0.0, 0.0, 0.0)
+    angular_momentum: tuple[float, float, float] = (0.0, 0.0, 0.0)
+    max_speed: float = 0.0
+
+    def as_dict(self) -> dict:
+        """Plain numbers, lists and dictionaries, ready for JSON."""
+        return asdict(self)
+
+    def __str__(self) -> str:
+        cap = "" if self.converged else " (iteration cap hit)"
+        return (
+            f"t = {self.time:.3f} s, {self.nodes} nodes, {self.elements} elements, "
+            f"{self.ms_per_step:.1f} ms a step, {self.iterations} CG iterations to {self.residual:.1e}{cap}, "
+            f"energy {self.energy.get('total', 0.0):.4g} J"
+        )

@@ -1,0 +1,232 @@
+"""Between NumPy and the fields. Few kernels with many arguments: each costs a compilation at start-up."""
+
+import numpy as np
+
+from taichifem.layout import Layout
+from taichifem.linear_algebra.pattern import BlockPattern
+from taichifem.runtime import PRECISIONS, ti
+from taichifem.world import World
+
+_array = ti.types.ndarray
+
+
+@ti.kernel
+def _fill_nodes(w: ti.template(), rest: _array(), v: _array(), incident_start: _array(), incident: _array()):
+    for i in range(rest.shape[0]):
+        for k in ti.static(range(3)):
+            w.rest[i][k] = rest[i, k]
+            w.x[i][k] = rest[i, k]
+            w.v[i][k] = v[i, k]
+        w.dv[i] = ti.Vector.zero(w.real, 3)
+        for c in range(w.touching.shape[0]):
+            w.touching[c, i] = 0
+            w.slip[c, i] = ti.Vector.zero(w.real, 3)
+    for i in range(incident_start.shape[0]):
+        w.incident_start[i] = incident_start[i]
+    for i in range(incident.shape[0]):
+        w.incident[i] = incident[i]
+
+
+@ti.kernel
+def _fill_elements(w: ti.template(), indices: _array(), gradients: _array(), volume: _array()):
+    for e in range(indices.shape[0]):
+        for a in ti.static(range(4)):
+            w.cell[e][a] = indices[e, a]
+        w.material[e] = indices[e, 4]
+        w.body[e] = indices[e, 5]
+        for a in ti.static(range(3)):
+            for k in ti.static(range(3)):
+                w.gradients[e][a, k] = gradients[e, a, k]
+        w.volume[e] = volume[e]
+        w.rotation[e] = ti.Vector([1.0, 0.0, 0.0, 0.0])
+        w.plastic[e] = ti.Vector.zero(w.real, 6)
+
+
+@ti.kernel
+def _fill_pattern(
+    w: ti.template(),
+    row_start: _array(),
+    column: _array(),
+    pair_start: _array(),
+    pair_entry: _array(),
+    upper: _array(),
+    lower: _array(),
+    diagonal: _array(),
+):
+    for i in range(row_start.shape[0]):
+        w.row_start[i] = row_start[i]
+    for i in range(column.shape[0]):
+        w.column[i] = column[i]
+    for i in range(pair_start.shape[0]):
+        w.pair_start[i] = pair_start[i]
+    for i in range(pair_entry.shape[0]):
+        w.pair_entry[i] = pair_entry[i]
+    for i in range(upper.shape[0]):
+        w.upper[i] = upper[i]
+        w.lower[i] = lower[i]
+    for i in range(diagonal.shape[0]):
+        w.diagonal[i] = diagonal[i]
+
+
+@ti.kernel
+def _fill_table(w: ti.template(), table: _array(), body_start: _array(), body_flies: _array()):
+    for i in range(table.shape[0]):
+        for k in ti.static(range(6)):
+            w.table[i][k] = table[i, k]
+    for b in range(body_flies.shape[0]):
+        w.body_start[b] = body_start[b]
+        w.body_start[b + 1] = body_start[b + 1]
+        w.body_flies[b] = body_flies[b]
+
+
+@ti.kernel
+def _fill_groups(w: ti.template(), held: _array(), pulled: _array(), stiffness: _array()):
+    for k in range(held.shape[0]):
+        w.held_node[k] = held[k, 0]
+        w.held_pose[k] = held[k, 1]
+        for a in ti.static(range(3)):
+            w.held_axes[k][a] = ti.cast(held[k, 2 + a], w.real)
+    for k in range(pulled.shape[0]):
+        w.pulled_node[k] = pulled[k, 0]
+        w.pulled_pose[k] = pulled[k, 1]
+        w.pulled_stiffness[k] = stiffness[k]
+
+
+@ti.kernel
+def _fill_poses(w: ti.template(), poses: _array()):
+    for g in range(poses.shape[0]):
+        for a in ti.static(range(3)):
+            for b in ti.static(range(3)):
+                w.pose_rotation[g][a, b] = poses[g, a, b]
+            w.pose_offset[g][a] = poses[g, a, 3]
+
+
+@ti.kernel
+def _fill_colliders(w: ti.template(), rows: _array()):
+    for c in range(rows.shape[0]):
+        w.collider_kind[c] = ti.cast(rows[c, 0], ti.i32)
+        w.collider_friction[c] = rows[c, 1]
+        for a in ti.static(range(3)):
+            w.collider_size[c][a] = rows[c, 2 + a]
+            w.collider_center[c][a] = rows[c, 5 + a]
+            w.collider_velocity[c][a] = rows[c, 8 + a]
+            w.collider_spin[c][a] = rows[c, 11 + a]
+            for b in ti.static(range(3)):
+                w.collider_rotation[c][a, b] = rows[c, 14 + 3 * a + b]
+
+
+@ti.kernel
+def _write(target: ti.template(), source: _array(), n: ti.i32):
+    for i in range(n):
+        for k in ti.static(range(target.n)):
+            target[i][k] = source[i, k]
+
+
+@ti.kernel
+def _read(source: ti.template(), target: _array(), n: ti.i32):
+    for i in range(n):
+        for k in ti.static(range(source.n)):
+            target[i, k] = source[i][k]
+
+
+@ti.kernel
+def _read_scalar(source: ti.template(), target: _array(), n: ti.i32):
+    for i in range(n):
+        target[i] = source[i]
+
+
+@ti.kernel
+def _read_matrix(source: ti.template(), target: _array(), n: ti.i32):
+    for i in range(n):
+        for a in ti.static(range(source.n)):
+            for b in ti.static(range(source.m)):
+                target[i, a, b] = source[i][a, b]
+
+
+@ti.kernel
+def _copy_contacts(w: ti.template(), slip: _array(), touching: _array(), into_fields: ti.i32):
+    for c, i in ti.ndrange(touching.shape[0], touching.shape[1]):
+        for k in ti.static(range(3)):
+            if into_fields:
+                w.slip[c, i][k] = slip[c, i, k]
+            else:
+                slip[c, i, k] = w.slip[c, i][k]
+        if into_fields:
+            w.touching[c, i] = touching[c, i]
+        else:
+            touching[c, i] = w.touching[c, i]
+
+
+def dtype_of(w: World) -> type:
+    """NumPy type of the world's real numbers."""
+    return np.float32 if w.real == PRECISIONS["f32"] else np.float64
+
+
+def _real(w: World, array: np.ndarray) -> np.ndarray:
+    return np.ascontiguousarray(array, dtype=dtype_of(w))
+
+
+def fill(w: World, layout: Layout, pattern: BlockPattern) -> None:
+    """Everything that is fixed while the topology is, and the state at the start."""
+    start, incident = pattern.incident_start, pattern.incident
+    _fill_nodes(w, _real(w, layout.rest), _real(w, layout.velocities), start, incident)
+    indices = np.column_stack([layout.cells, layout.cell_materials, layout.cell_bodies]).astype(np.int32)
+    _fill_elements(w, indices, _real(w, layout.gradients), _real(w, layout.volumes))
+    p = pattern
+    _fill_pattern(w, p.row_start, p.column, p.pair_start, p.pair_entry, p.upper, p.lower, p.diagonal)
+
+
+def fill_table(w: World, table: np.ndarray, body_start: np.ndarray, body_flies: np.ndarray) -> None:
+    """Material rows (materials,6), node ranges of the bodies, and which of them nothing pins."""
+    _fill_table(w, _real(w, table), body_start, body_flies.astype(np.int32))
+
+
+def fill_groups(w: World, held: np.ndarray, pulled: np.ndarray, stiffness: np.ndarray) -> None:
+    """held (k,5): node, pose, axes.  pulled (k,2): node, pose, with stiffness (k,) [N/m]."""
+    # Taichi takes no empty arrays: one row too many is harmless, the counts say what is in use.
+    held = np.vstack([held, np.zeros((1, 5))]).astype(np.int32)
+    pulled = np.vstack([pulled, np.zeros((1, 2))]).astype(np.int32)
+    _fill_groups(w, held, pulled, _real(w, np.append(stiffness, 0.0)))
+
+
+def fill_poses(w: World, poses: np.ndarray) -> None:
+    """Rotation and offset of each group (groups,3,4)."""
+    _fill_poses(w, _real(w, poses))
+
+
+def fill_colliders(w: World, rows: np.ndarray) -> None:
+    """kind, friction, size (3), center (3), velocity (3), spin (3), rotation (9) of each collider."""
+    _fill_colliders(w, _real(w, rows))
+
+
+def read(w: World, field, n: int) -> np.ndarray:
+    """The first n entries of a scalar, vector or matrix field, in the world's precision."""
+    shape = getattr(field, "n", None), getattr(field, "m", None)
+    if shape[0] is None:
+        target = np.empty(n, dtype=dtype_of(w))
+        _read_scalar(field, target, n)
+    elif shape[1] == 1:
+        target = np.empty((n, shape[0]), dtype=dtype_of(w))
+        _read(field, target, n)
+    else:
+        target = np.empty((n, *shape), dtype=dtype_of(w))
+        _read_matrix(field, target, n)
+    return target
+
+
+def write(w: World, field, array: np.ndarray) -> None:
+    """Set the first entries of a vector field from (n,k)."""
+    _write(field, _real(w, array), len(array))
+
+
+def read_contacts(w: World, n_colliders: int, n: int) -> tuple[np.ndarray, np.ndarray]:
+    """Friction stretch (colliders,n,3) [m] and contact state (colliders,n)."""
+    slip = np.zeros((max(n_colliders, 1), n, 3), dtype=dtype_of(w))
+    touching = np.zeros(slip.shape[:2], dtype=np.int32)
+    _copy_contacts(w, slip, touching, 0)
+    return slip, touching
+
+
+def write_contacts(w: World, slip: np.ndarray, touching: np.ndarray) -> None:
+    """The inverse of `read_contacts`."""
+    _copy_contacts(w, _real(w, slip), touching.astype(np.int32), 1)

@@ -1,0 +1,168 @@
+"""The Taichi fields: nodes, elements, materials, block matrix, colliders. One world holds all bodies.
+
+A world has room for a number of nodes, elements and so on (its `Capacity`), rounded up to powers of two. Kernels
+are compiled for a world, so `acquire` hands out a free one of the same capacity before it makes a new one: a
+second simulation of about the same size in a process starts without compiling.
+"""
+
+from __future__ import annotations
+
+import weakref
+from dataclasses import astuple, dataclass
+
+from taichifem import runtime
+from taichifem.runtime import ti
+
+CHUNKS = 64
+"""Parallel sums add this many contiguous parts, in order: the same result for any number of threads."""
+
+
+def round_up(count: int, least: int) -> int:
+    """The power of two that holds `count`, at least `least`."""
+    return max(least, 1 << max(0, int(count) - 1).bit_length())
+
+
+@dataclass(frozen=True)
+class Capacity:
+    """Room in a world, in entries."""
+
+    nodes: int
+    elements: int
+    blocks: int
+    pairs: int
+    materials: int = 1
+    colliders: int = 1
+    held: int = 1
+    pulled: int = 1
+    poses: int = 1
+    bodies: int = 1
+
+    LEAST = (256, 1024, 4096, 2048, 8, 4, 256, 256, 8, 8)
+
+    def rounded(self) -> Capacity:
+        """The capacity class: every entry rounded up to a power of two."""
+        return Capacity(*(round_up(n, k) for n, k in zip(astuple(self), self.LEAST, strict=True)))
+
+
+@dataclass
+class Counts:
+    """How much of a world is in use."""
+
+    nodes: int = 0
+    elements: int = 0
+    pairs: int = 0
+    bodies: int = 0
+    colliders: int = 0
+    held: int = 0
+    pulled: int = 0
+
+
+@ti.data_oriented
+class World:
+    """Fields of one capacity and precision. Kernels take it as their first argument, by name.
+
+    Nodes: `x` position, `v` velocity, `rest` (all [m], [m/s]), `x0`, `v0` at the start of the step, `mass` [kg],
+    `drag` mass-proportional damping [kg/s], `free` 1 or 0 per axis, `dv` the unknown of the step.
+    Elements: `cell` nodes, `material` row, `gradients` rows g_1..g_3 of D_m^-1 (B of the slides), `volume` [m^3],
+    `rotation` quaternion, `plastic` strain (xx, yy, zz, xy, yz, zx), `body`, and per step `h` (scaled rotated
+    gradients) and `corner_force` [N].
+    """
+
+    def __init__(self, capacity: Capacity, precision: str) -> None:
+        self.capacity = capacity
+        self.precision = precision
+        self.real = runtime.PRECISIONS[precision]
+        self._builder = ti.FieldsBuilder()
+        self._place_nodes()
+        self._place_elements()
+        self._place_matrix()
+        self._place_surroundings()
+        self._builder.finalize()
+
+    def _scalar(self, size: int, dtype=None):
+        field = ti.field(dtype or self.real)
+        self._builder.dense(ti.i, size).place(field)
+        return field
+
+    def _vector(self, size: int, n: int, dtype=None):
+        field = ti.Vector.field(n, dtype or self.real)
+        self._builder.dense(ti.i, size).place(field)
+        return field
+
+    def _matrix(self, size: int, n: int, m: int):
+        field = ti.Matrix.field(n, m, self.real)
+        self._builder.dense(ti.i, size).place(field)
+        return field
+
+    def _place_nodes(self) -> None:
+        n = self.capacity.nodes
+        self.x, self.v, self.rest = (self._vector(n, 3) for _ in range(3))
+        self.x0, self.v0, self.free, self.dv = (self._vector(n, 3) for _ in range(4))
+        self.mass, self.drag = self._scalar(n), self._scalar(n)
+        self.force = self._vector(n, 3)  # elastic force [N]
+        self.load = self._vector(n, 3)  # right-hand side of the step, without contact and handles [N s]
+        self.incident_start = self._scalar(n + 1, ti.i32)
+        self.incident = self._scalar(4 * self.capacity.elements, ti.i32)
+
+    def _place_elements(self) -> None:
+        m = self.capacity.elements
+        self.cell = self._vector(m, 4, ti.i32)
+        self.material, self.body = self._scalar(m, ti.i32), self._scalar(m, ti.i32)
+        self.gradients, self.volume = self._matrix(m, 3, 3), self._scalar(m)
+        self.rotation, self.plastic = self._vector(m, 4), self._vector(m, 6)
+        self.h, self.corner_force = self._matrix(m, 4, 3), self._matrix(m, 4, 3)
+        self.moduli = self._vector(m, 2)  # lambda and mu, times the step's factor of K
+        self.stress = self._matrix(m, 3, 3)
+        self.energy = self._scalar(m)
+        # Material table: lambda, mu [Pa], mass damping [1/s], stiffness damping [s], density, 1 if it turns.
+        self.table = self._vector(self.capacity.materials, 6)
+
+    def _place_matrix(self) -> None:
+        c = self.capacity
+        self.row_start, self.column = self._scalar(c.nodes + 1, ti.i32), self._scalar(c.blocks, ti.i32)
+        self.pair_start, self.pair_entry = (
+            self._scalar(c.pairs + 1, ti.i32),
+            self._scalar(10 * c.elements, ti.i32),
+        )
+        self.upper, self.lower = self._scalar(c.pairs, ti.i32), self._scalar(c.pairs, ti.i32)
+        self.diagonal = self._scalar(c.nodes, ti.i32)
+        self.block = self._matrix(c.blocks, 3, 3)
+        self.spring = self._matrix(c.nodes, 3, 3)  # dt^2 times contact and handle stiffness, on the diagonal
+        self.spring_load = self._vector(c.nodes, 3)
+        self.inverse = self._matrix(c.nodes, 3, 3)
+        self.residual, self.direction, self.product = (self._vector(c.nodes, 3) for _ in range(3))
+        self.partial = self._vector(CHUNKS, 4, ti.f64)
+        self.scalar = self._scalar(16, ti.f64)
+
+    def _place_surroundings(self) -> None:
+        c = self.capacity
+        self.body_start, self.body_flies = self._scalar(c.bodies + 1, ti.i32), self._scalar(c.bodies, ti.i32)
+        # Poses move pins and handles: rows of R and c, at the end of the step.
+        self.pose_rotation, self.pose_offset = self._matrix(c.poses, 3, 3), self._vector(c.poses, 3)
+        self.held_node, self.held_pose = self._scalar(c.held, ti.i32), self._scalar(c.held, ti.i32)
+        self.held_axes = self._vector(c.held, 3)
+        self.pulled_node, self.pulled_pose = self._scalar(c.pulled, ti.i32), self._scalar(c.pulled, ti.i32)
+        self.pulled_stiffness = self._scalar(c.pulled)
+        k = c.colliders
+        self.collider_kind = self._scalar(k, ti.i32)
+        self.collider_rotation, self.collider_center = self._matrix(k, 3, 3), self._vector(k, 3)
+        self.collider_size, self.collider_friction = self._vector(k, 3), self._scalar(k)
+        self.collider_velocity, self.collider_spin = self._vector(k, 3), self._vector(k, 3)
+        self.contact_stiffness = self._scalar(c.nodes)
+        self.slip = ti.Vector.field(3, self.real)
+        self.touching = ti.field(ti.i32)
+        self._builder.dense(ti.ij, (k, c.nodes)).place(self.slip)
+        self._builder.dense(ti.ij, (k, c.nodes)).place(self.touching)
+
+
+_free: dict[tuple, list[World]] = {}
+
+
+def acquire(capacity: Capacity, precision: str, owner: object) -> World:
+    """A world with room for `capacity`, lent until `owner` is garbage."""
+    runtime.start()
+    key = (runtime.generation, precision, *astuple(capacity.rounded()))
+    shelf = _free.setdefault(key, [])
+    world = shelf.pop() if shelf else World(capacity.rounded(), precision)
+    weakref.finalize(owner, shelf.append, world)
+    return world
