@@ -5,7 +5,6 @@ from __future__ import annotations
 import hashlib
 import json
 import os
-import tempfile
 import zipfile
 from collections.abc import Mapping
 from pathlib import Path
@@ -13,6 +12,7 @@ from pathlib import Path
 import numpy as np
 
 from taichifem.errors import InputError
+from taichifem.files import replacing
 
 FORMAT = "taichifem-checkpoint"
 VERSION = 1
@@ -28,25 +28,15 @@ def fingerprint(*arrays: np.ndarray, text: str = "") -> str:
 
 
 def write(path: str | os.PathLike, arrays: Mapping[str, np.ndarray], header: Mapping) -> None:
-    """Write to a temporary file beside `path`, then rename: an older checkpoint survives every failure.
+    """Write a checkpoint; one that is there already survives every failure.
 
     Raises InputError if the file cannot be written.
     """
-    path = Path(path)
     text = json.dumps({"format": FORMAT, "version": VERSION, **header})
-    temporary = None
-    try:
-        path.parent.mkdir(parents=True, exist_ok=True)
-        handle, temporary = tempfile.mkstemp(dir=path.parent, prefix=path.name, suffix=".part")
-        with os.fdopen(handle, "wb") as file:
-            np.savez(file, header=np.frombuffer(text.encode(), dtype=np.uint8), **arrays)
-            file.flush()
-            os.fsync(file.fileno())
-        os.replace(temporary, path)
-    except OSError as error:
-        if temporary is not None:
-            Path(temporary).unlink(missing_ok=True)
-        raise InputError(f"{path}: the checkpoint cannot be written ({error.strerror or error})") from None
+    with replacing(path) as part, open(part, "wb") as file:
+        np.savez(file, header=np.frombuffer(text.encode(), dtype=np.uint8), **arrays)
+        file.flush()
+        os.fsync(file.fileno())
 
 
 def read(path: str | os.PathLike) -> tuple[dict[str, np.ndarray], dict]:

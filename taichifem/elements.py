@@ -37,12 +37,13 @@ def _strain(F, R, w: ti.template(), e: ti.i32):
 
 
 @ti.func
-def _rotation(w: ti.template(), e: ti.i32, F, most: ti.i32):
-    """Rotation of element e, updated from its last one; the identity for linear materials."""
+def _rotation(w: ti.template(), e: ti.i32, F, most: ti.i32, keep: ti.i32):
+    """Rotation of element e, found from its last one, which it replaces if `keep`; the identity if linear."""
     R = ti.Matrix.identity(w.real, 3)
     if w.table[w.material[e]][TURNS] > 0:
         q = rotation.nearest_rotation(F, w.rotation[e], ti.cast(ti.static(_tolerance(w.precision)), w.real), most)
-        w.rotation[e] = q
+        if keep:
+            w.rotation[e] = q
         R = rotation.rotation_of(q)
     return R
 
@@ -61,19 +62,20 @@ def deform(
     rate_factor: ti.f64,
     rate_damping: ti.f64,
     most: ti.i32,
+    keep: ti.i32,
 ):
     """Rotations, forces at the corners and what the matrix needs, from positions `w.x` and velocities `w.v`.
 
     Corner forces are -V R (sigma + sigma_rate) g_a, where the rate stress is that of the strain rate times
     (rate_factor + rate_damping beta): the part of dt K v that linearisation brings, and the damping.
     `w.moduli` becomes V (stiffness_factor + damping_factor beta) (lambda, mu), with beta the material's stiffness
-    damping.  most: iterations for a rotation.
+    damping.  most: iterations for a rotation.  keep: the rotations found start the next search; 0 leaves no trace.
     """
     for e in range(n_elements):
         row = w.table[w.material[e]]
         gradients = w.gradients[e]
         F = _edges(w.x, w, e) @ gradients
-        R = _rotation(w, e, F, most)
+        R = _rotation(w, e, F, most, keep)
         rate = _symmetric(R.transpose() @ (_edges(w.v, w, e) @ gradients))
         damping = row[STIFFNESS_DAMPING]
         strain = _strain(F, R, w, e) + (ti.cast(rate_factor, w.real) + ti.cast(rate_damping, w.real) * damping) * rate
@@ -122,7 +124,7 @@ def measure(w: ti.template(), n_elements: ti.i32, most: ti.i32):
     for e in range(n_elements):
         row = w.table[w.material[e]]
         F = _edges(w.x, w, e) @ w.gradients[e]
-        R = _rotation(w, e, F, most)
+        R = _rotation(w, e, F, most, 0)
         strain = _strain(F, R, w, e)
         sigma = hooke.stress(strain, row[LAMBDA], row[MU])
         cauchy = R @ sigma @ R.transpose()
@@ -134,11 +136,11 @@ def measure(w: ti.template(), n_elements: ti.i32, most: ti.i32):
 
 
 @ti.kernel
-def gather_masses(w: ti.template(), n: ti.i32):
-    """Lumped mass and mass-proportional damping of the nodes, and the size of their contact springs.
+def gather_masses(w: ti.template(), n: ti.i32, n_bodies: ti.i32):
+    """Lumped mass and mass-proportional damping of the nodes, and what sizes their contact springs.
 
-    A contact spring is `w.contact_stiffness` [N/m]: the trace of the node's own stiffness block at rest, which
-    no rotation changes, over 3.
+    `w.contact_stiffness` [N/m] is the trace of the node's own stiffness block at rest, which no rotation changes,
+    over 3; `w.body_mass` [kg] is the mass of its body.
     """
     for i in range(n):
         mass, drag, stiffness = ti.cast(0.0, w.real), ti.cast(0.0, w.real), ti.cast(0.0, w.real)
@@ -156,3 +158,9 @@ def gather_masses(w: ti.template(), n: ti.i32):
         w.mass[i] = mass
         w.drag[i] = drag
         w.contact_stiffness[i] = stiffness
+    for b in range(n_bodies):
+        total = ti.cast(0.0, ti.f64)
+        for i in range(w.body_start[b], w.body_start[b + 1]):
+            total += ti.cast(w.mass[i], ti.f64)
+        for i in range(w.body_start[b], w.body_start[b + 1]):
+            w.body_mass[i] = ti.cast(total, w.real)

@@ -13,7 +13,7 @@ from taichifem.description.check import whole
 from taichifem.errors import Diverged, InputError
 from taichifem.integrators import backward_euler
 from taichifem.layout import Group, Layout, lay_out
-from taichifem.linear_algebra import assembly
+from taichifem.linear_algebra import assembly, balance
 from taichifem.linear_algebra.pattern import BlockPattern, block_pattern
 from taichifem.stats import Stats
 from taichifem.timing import PhaseTimer
@@ -147,7 +147,7 @@ class Simulation:
         self._active = active
         n_pins = len(self._layout.pins)
         held, pulled, stiffness = [np.zeros((0, 5))], [np.zeros((0, 2))], [np.zeros(0)]
-        flies = np.ones(len(self.scene.bodies), dtype=bool)
+        held_bodies = np.zeros(len(self.scene.bodies), dtype=bool)
         for g, group in enumerate(self._groups):
             if not active[g]:
                 continue
@@ -155,13 +155,13 @@ class Simulation:
             if g < n_pins:
                 axes = np.tile(group.axes, (len(group.nodes), 1))
                 held.append(np.column_stack([group.nodes, pose, axes]))
-                flies[self._layout.node_bodies[group.nodes]] = False
+                held_bodies[self._layout.node_bodies[group.nodes]] = True
             else:
                 pulled.append(np.column_stack([group.nodes, pose]))
                 stiffness.append(np.full(len(group.nodes), group.stiffness))
         held, pulled = np.concatenate(held), np.concatenate(pulled)
         self._counts.held, self._counts.pulled = len(held), len(pulled)
-        self._flies = flies
+        self._held_bodies = held_bodies
         with self._kernels():
             transfer.fill_groups(self._world, held, pulled, np.concatenate(stiffness))
         if self.step_count:
@@ -198,9 +198,13 @@ class Simulation:
                 for m in self._materials
             ]
         )
+        turning = np.zeros(len(self.scene.bodies), dtype=bool)
+        for (body, _), row in self._layout.material_of.items():
+            turning[body] |= self._materials[row].model != "linear"
+        flies = np.where(self._held_bodies, balance.HELD, np.where(turning, balance.TURNS, balance.LINEAR))
         with self._kernels():
-            transfer.fill_table(self._world, rows, self._layout.body_start, self._flies)
-            elements.gather_masses(self._world, self._counts.nodes)
+            transfer.fill_table(self._world, rows, self._layout.body_start, flies)
+            elements.gather_masses(self._world, self._counts.nodes, self._counts.bodies)
 
     def set_material(self, body: int, material: Material, *, region: int | None = None) -> None:
         """Change a body's material (or that of one region of it) from the next step on; nothing recompiles."""
@@ -290,7 +294,7 @@ class Simulation:
 
     def _deform(self) -> None:
         """Corner forces and matrix ingredients for K itself, without damping."""
-        elements.deform(self._world, self._counts.elements, 1.0, 0.0, 0.0, 0.0, backward_euler.ROTATION_ITERATIONS)
+        elements.deform(self._world, self._counts.elements, 1.0, 0.0, 0.0, 0.0, backward_euler.ROTATION_ITERATIONS, 0)
 
     def elastic_forces(self) -> np.ndarray:
         """Elastic forces on the nodes (n,3) [N] at the current positions, without damping."""
@@ -347,8 +351,8 @@ class Simulation:
         contacts = 0
         if self._counts.colliders:
             with self._kernels():
-                _, touching = transfer.read_contacts(self._world, self._counts.colliders, self._counts.nodes)
-            contacts = int((touching > 0).sum())
+                state = transfer.read_contacts(self._world, self._counts.colliders, self._counts.nodes)
+            contacts = int((state["touching"] > 0).sum())
         ms = {name: round(t, 4) for name, t in self._timer.ms.items()}
         return Stats(
             time=self.time,
@@ -390,15 +394,13 @@ class Simulation:
         """Write everything the next steps depend on; see `load`. Raises InputError if it cannot be written."""
         w, n, m = self._world, self._counts.nodes, self._counts.elements
         with self._kernels():
-            slip, touching = transfer.read_contacts(w, self._counts.colliders, n)
             arrays = {
                 "x": transfer.read(w, w.x, n),
                 "v": transfer.read(w, w.v, n),
                 "dv": transfer.read(w, w.dv, n),
                 "rotation": transfer.read(w, w.rotation, m),
                 "plastic": transfer.read(w, w.plastic, m),
-                "slip": slip,
-                "touching": touching,
+                **transfer.read_contacts(w, self._counts.colliders, n),
             }
         header = {"scene": self._fingerprint(), "step": self.step_count, "dt": self.scene.dt}
         checkpoint.write(path, arrays, header)
@@ -415,7 +417,7 @@ class Simulation:
         with self._kernels():
             for name in ("x", "v", "dv", "rotation", "plastic"):
                 transfer.write(w, getattr(w, name), arrays[name])
-            transfer.write_contacts(w, arrays["slip"], arrays["touching"])
+            transfer.write_contacts(w, arrays)
         self.step_count = int(header["step"])
         self._active = None
         self._choose_groups(self.time)

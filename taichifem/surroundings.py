@@ -8,7 +8,7 @@ import numpy as np
 
 from taichifem.description import BoxCollider, Collider, Motion, PlaneCollider, SphereCollider
 from taichifem.description.motion import rotation_matrix
-from taichifem.formulas.signed_distance import BOX, PLANE, SPHERE
+from taichifem.formulas.collision import BOX, PLANE, SPHERE
 
 _STILL = (np.eye(3), np.zeros(3))
 
@@ -54,23 +54,13 @@ def _spin(before: np.ndarray, after: np.ndarray, dt: float) -> np.ndarray:
 
 
 def collider_table(colliders: Sequence[Collider], time: float, dt: float) -> np.ndarray:
-    """Rows for `transfer.fill_colliders` (colliders,23): where they stand at `time`, moving since `time - dt`."""
+    """Rows for `transfer.fill_colliders` (colliders,35): where they stand at `time`, moving since `time - dt`."""
     rows = []
     for collider in colliders:
-        kind, frame, center, size = _rest_frame(collider)
+        kind, frame, point, size = _rest_frame(collider)
         (R0, c0), (R1, c1) = pose(collider.motion, time - dt), pose(collider.motion, time)
-        velocity = ((R1 @ center + c1) - (R0 @ center + c0)) / dt
-        placed = R1 @ frame
-        rows.append(
-            np.concatenate(
-                [
-                    [kind, collider.friction],
-                    size,
-                    R1 @ center + c1,
-                    velocity,
-                    _spin(R0, R1, dt),
-                    placed.ravel(),
-                ]
-            )
-        )
-    return np.array(rows) if rows else np.zeros((1, 23))
+        before, after = R0 @ point + c0, R1 @ point + c1
+        velocity, spin = (after - before) / dt, _spin(R0, R1, dt)
+        turns = (R1 @ frame).ravel(), (R0 @ frame).ravel()
+        rows.append(np.concatenate([[kind, collider.friction], size, after, velocity, spin, before, *turns]))
+    return np.array(rows) if rows else np.zeros((1, 35))

@@ -21,6 +21,7 @@ def _fill_nodes(w: ti.template(), rest: _array(), v: _array(), incident_start: _
         for c in range(w.touching.shape[0]):
             w.touching[c, i] = 0
             w.slip[c, i] = ti.Vector.zero(w.real, 3)
+            w.pressed[c, i] = 0.0
     for i in range(incident_start.shape[0]):
         w.incident_start[i] = incident_start[i]
     for i in range(incident.shape[0]):
@@ -111,8 +112,10 @@ def _fill_colliders(w: ti.template(), rows: _array()):
             w.collider_center[c][a] = rows[c, 5 + a]
             w.collider_velocity[c][a] = rows[c, 8 + a]
             w.collider_spin[c][a] = rows[c, 11 + a]
+            w.collider_center0[c][a] = rows[c, 14 + a]
             for b in ti.static(range(3)):
-                w.collider_rotation[c][a, b] = rows[c, 14 + 3 * a + b]
+                w.collider_rotation[c][a, b] = rows[c, 17 + 3 * a + b]
+                w.collider_rotation0[c][a, b] = rows[c, 26 + 3 * a + b]
 
 
 @ti.kernel
@@ -144,17 +147,21 @@ def _read_matrix(source: ti.template(), target: _array(), n: ti.i32):
 
 
 @ti.kernel
-def _copy_contacts(w: ti.template(), slip: _array(), touching: _array(), into_fields: ti.i32):
+def _read_contacts(w: ti.template(), slip: _array(), pressed: _array(), touching: _array()):
     for c, i in ti.ndrange(touching.shape[0], touching.shape[1]):
         for k in ti.static(range(3)):
-            if into_fields:
-                w.slip[c, i][k] = slip[c, i, k]
-            else:
-                slip[c, i, k] = w.slip[c, i][k]
-        if into_fields:
-            w.touching[c, i] = touching[c, i]
-        else:
-            touching[c, i] = w.touching[c, i]
+            slip[c, i, k] = w.slip[c, i][k]
+        pressed[c, i] = w.pressed[c, i]
+        touching[c, i] = w.touching[c, i]
+
+
+@ti.kernel
+def _write_contacts(w: ti.template(), slip: _array(), pressed: _array(), touching: _array()):
+    for c, i in ti.ndrange(touching.shape[0], touching.shape[1]):
+        for k in ti.static(range(3)):
+            w.slip[c, i][k] = slip[c, i, k]
+        w.pressed[c, i] = pressed[c, i]
+        w.touching[c, i] = touching[c, i]
 
 
 def dtype_of(w: World) -> type:
@@ -177,7 +184,7 @@ def fill(w: World, layout: Layout, pattern: BlockPattern) -> None:
 
 
 def fill_table(w: World, table: np.ndarray, body_start: np.ndarray, body_flies: np.ndarray) -> None:
-    """Material rows (materials,6), node ranges of the bodies, and which of them nothing pins."""
+    """Material rows (materials,6), node ranges of the bodies, and how each flies (`linear_algebra.balance`)."""
     _fill_table(w, _real(w, table), body_start, body_flies.astype(np.int32))
 
 
@@ -195,7 +202,7 @@ def fill_poses(w: World, poses: np.ndarray) -> None:
 
 
 def fill_colliders(w: World, rows: np.ndarray) -> None:
-    """kind, friction, size (3), center (3), velocity (3), spin (3), rotation (9) of each collider."""
+    """kind, friction, size, center, velocity, spin, center before, rotation and rotation before of each collider."""
     _fill_colliders(w, _real(w, rows))
 
 
@@ -219,14 +226,19 @@ def write(w: World, field, array: np.ndarray) -> None:
     _write(field, _real(w, array), len(array))
 
 
-def read_contacts(w: World, n_colliders: int, n: int) -> tuple[np.ndarray, np.ndarray]:
-    """Friction stretch (colliders,n,3) [m] and contact state (colliders,n)."""
-    slip = np.zeros((max(n_colliders, 1), n, 3), dtype=dtype_of(w))
-    touching = np.zeros(slip.shape[:2], dtype=np.int32)
-    _copy_contacts(w, slip, touching, 0)
-    return slip, touching
+def read_contacts(w: World, n_colliders: int, n: int) -> dict[str, np.ndarray]:
+    """slip (colliders,n,3) [m], pressed (colliders,n) [N] and touching (colliders,n) of `World`."""
+    shape = (max(n_colliders, 1), n)
+    real = dtype_of(w)
+    arrays = {
+        "slip": np.zeros((*shape, 3), real),
+        "pressed": np.zeros(shape, real),
+        "touching": np.zeros(shape, np.int32),
+    }
+    _read_contacts(w, *arrays.values())
+    return arrays
 
 
-def write_contacts(w: World, slip: np.ndarray, touching: np.ndarray) -> None:
+def write_contacts(w: World, arrays: dict[str, np.ndarray]) -> None:
     """The inverse of `read_contacts`."""
-    _copy_contacts(w, _real(w, slip), touching.astype(np.int32), 1)
+    _write_contacts(w, *(np.ascontiguousarray(arrays[name]) for name in ("slip", "pressed", "touching")))

@@ -129,9 +129,10 @@ class World:
         self.block = self._matrix(c.blocks, 3, 3)
         self.spring = self._matrix(c.nodes, 3, 3)  # dt^2 times contact and handle stiffness, on the diagonal
         self.spring_load = self._vector(c.nodes, 3)
+        self.sprung = self._scalar(c.nodes, ti.i32)  # 1 where a spring acts
         self.inverse = self._matrix(c.nodes, 3, 3)
         self.residual, self.direction, self.product = (self._vector(c.nodes, 3) for _ in range(3))
-        self.partial = self._vector(CHUNKS, 4, ti.f64)
+        self.partial = self._vector(CHUNKS, 5, ti.f64)
         self.scalar = self._scalar(16, ti.f64)
 
     def _place_surroundings(self) -> None:
@@ -146,13 +147,16 @@ class World:
         k = c.colliders
         self.collider_kind = self._scalar(k, ti.i32)
         self.collider_rotation, self.collider_center = self._matrix(k, 3, 3), self._vector(k, 3)
+        self.collider_rotation0, self.collider_center0 = self._matrix(k, 3, 3), self._vector(k, 3)
         self.collider_size, self.collider_friction = self._vector(k, 3), self._scalar(k)
         self.collider_velocity, self.collider_spin = self._vector(k, 3), self._vector(k, 3)
-        self.contact_stiffness = self._scalar(c.nodes)
+        # A node's own stiffness at rest [N/m], and the mass of its body [kg]: they size its contact springs.
+        self.contact_stiffness, self.body_mass = self._scalar(c.nodes), self._scalar(c.nodes)
         self.slip = ti.Vector.field(3, self.real)
+        self.pressed = ti.field(self.real)  # normal force that friction was last set for [N]
         self.touching = ti.field(ti.i32)
         self._builder.dense(ti.ij, (k, c.nodes)).place(self.slip)
-        self._builder.dense(ti.ij, (k, c.nodes)).place(self.touching)
+        self._builder.dense(ti.ij, (k, c.nodes)).place(self.pressed, self.touching)
 
 
 _free: dict[tuple, list[World]] = {}

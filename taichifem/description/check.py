@@ -6,8 +6,6 @@ import math
 from collections.abc import Iterable, Sequence
 from numbers import Integral, Real
 
-import numpy as np
-
 from taichifem.errors import InputError
 
 Vector = tuple[float, float, float]
@@ -26,7 +24,10 @@ def number(
     unit = f" [{unit}]" if unit else ""
     if isinstance(value, bool) or not isinstance(value, Real):
         raise InputError(f"{name} must be a number{unit}, not {value!r}")
-    value = float(value)
+    try:
+        value = float(value)
+    except OverflowError:
+        value = math.inf
     if not math.isfinite(value):
         raise InputError(f"{name} is {value}: give a finite number{unit}")
     if above is not None and not value > above:
@@ -47,14 +48,10 @@ def whole(name: str, value: object, *, at_least: int = 1) -> int:
 
 def vector(name: str, value: object, *, unit: str = "") -> Vector:
     """`value` as three finite floats."""
-    unit = f" [{unit}]" if unit else ""
-    try:
-        array = np.asarray(value, dtype=float)
-    except (TypeError, ValueError):
-        raise InputError(f"{name} must be three numbers{unit}, not {value!r}") from None
-    if array.shape != (3,) or not np.isfinite(array).all():
-        raise InputError(f"{name} must be three finite numbers{unit}, not {value!r}")
-    return tuple(float(v) for v in array)
+    label = f" [{unit}]" if unit else ""
+    if isinstance(value, str) or not isinstance(value, Iterable) or len(value := tuple(value)) != 3:
+        raise InputError(f"{name} must be three numbers{label}, not {value!r}")
+    return tuple(number(f"{name}[{k}]", v, unit=unit) for k, v in enumerate(value))
 
 
 def numbers(name: str, value: object) -> tuple[float, ...]:

@@ -55,7 +55,8 @@ class IndexRegion:
 
     def __post_init__(self) -> None:
         for k, index in enumerate(self.indices):
-            check.whole(f"indices[{k}]", index, at_least=0)
+            if check.whole(f"indices[{k}]", index, at_least=0) >= 2**31:
+                raise InputError(f"indices[{k}] is {index}: no mesh has so many nodes")
 
     def select(self, points: np.ndarray) -> np.ndarray:
         """The indices themselves. Raises InputError if one is outside the mesh."""

@@ -132,6 +132,10 @@ class Scene:
     def __post_init__(self) -> None:
         if not len(self.bodies):
             raise InputError("the scene has no body: add at least one")
+        names = [body.name for body in self.bodies if body.name]
+        for name in names:
+            if names.count(name) > 1:
+                raise InputError(f"two bodies are called {name!r}: give each its own name")
         check.vector("gravity", self.gravity, unit="m/s^2")
         check.number("fps", self.fps, above=0, unit="1/s")
         check.whole("substeps", self.substeps)

@@ -34,10 +34,11 @@ def nearest_rotation(F, start, tolerance, most: ti.i32):
     """Unit quaternion of the proper rotation R that maximises tr(R^T F): the polar factor, det R = +1 always.
 
     Newton's method on the rotation group, started from the quaternion `start` (the rotation of the last step:
-    one or two iterations then suffice). With S = R^T F, the ascent direction is the axial vector a of
-    S - S^T and the Hessian is tr(S) I - sym(S) (Kugelstadt, Koschier & Bender 2018). Where that is not
-    positive definite (crushed and inverted elements), the safe step a / (|tr S| + |S|) of Mueller et al. 2016
-    is taken. Stops when the turn is below `tolerance` [rad] or after `most` iterations.
+    one or two iterations then suffice). With S = R^T F, the gradient is the axial vector a of S - S^T and the
+    negative Hessian is H = tr(S) I - sym(S) (Kugelstadt, Koschier & Bender 2018). Where H is not positive
+    definite (crushed and inverted elements), the gradient itself is the direction. Along an axis n the objective
+    is (n.H n) cos t + (n.a) sin t + const, so the best angle t is known exactly and every turn ascends.
+    Stops when a Newton turn is below `tolerance` [rad], or after `most` iterations.
     """
     q = start
     left = most
@@ -46,34 +47,39 @@ def nearest_rotation(F, start, tolerance, most: ti.i32):
         S = rotation_of(q).transpose() @ F
         a = ti.Vector([S[2, 1] - S[1, 2], S[0, 2] - S[2, 0], S[1, 0] - S[0, 1]])
         trace = S[0, 0] + S[1, 1] + S[2, 2]
-        size = ti.sqrt(S.norm_sqr())
         h00, h11, h22 = trace - S[0, 0], trace - S[1, 1], trace - S[2, 2]
-        h01, h02, h12 = (
-            -0.5 * (S[0, 1] + S[1, 0]),
-            -0.5 * (S[0, 2] + S[2, 0]),
-            -0.5 * (S[1, 2] + S[2, 1]),
-        )
+        h01, h02, h12 = -0.5 * (S[0, 1] + S[1, 0]), -0.5 * (S[0, 2] + S[2, 0]), -0.5 * (S[1, 2] + S[2, 1])
         c00, c01, c02 = h11 * h22 - h12 * h12, h02 * h12 - h01 * h22, h01 * h12 - h02 * h11
-        minor = h00 * h11 - h01 * h01
-        det = h00 * c00 + h01 * c01 + h02 * c02
-        turn = a / (ti.abs(trace) + size + 1e-30)
-        if h00 > 0.05 * size and minor > 0.0025 * size * size and det > 1.25e-4 * size * size * size:
-            c11, c12, c22 = h00 * h22 - h02 * h02, h01 * h02 - h00 * h12, minor
-            newton = (
-                ti.Vector(
-                    [
-                        c00 * a[0] + c01 * a[1] + c02 * a[2],
-                        c01 * a[0] + c11 * a[1] + c12 * a[2],
-                        c02 * a[0] + c12 * a[1] + c22 * a[2],
-                    ]
-                )
-                / det
+        c11, c12, c22 = h00 * h22 - h02 * h02, h01 * h02 - h00 * h12, h00 * h11 - h01 * h01
+        n = a
+        newton = h00 > 0 and c22 > 0 and h00 * c00 + h01 * c01 + h02 * c02 > 0
+        if newton:
+            n = ti.Vector(
+                [
+                    c00 * a[0] + c01 * a[1] + c02 * a[2],
+                    c01 * a[0] + c11 * a[1] + c12 * a[2],
+                    c02 * a[0] + c12 * a[1] + c22 * a[2],
+                ]
             )
-            # Beyond half a radian the quadratic model says little: keep to the safe step.
-            if newton.norm_sqr() < 0.25:
-                turn = newton
-        # Cayley map: the quaternion (1, turn / 2), normalised, turns by 2 atan(|turn| / 2).
-        q = quaternion_product(q, ti.Vector([1.0, 0.5 * turn[0], 0.5 * turn[1], 0.5 * turn[2]])).normalized()
-        if turn.norm_sqr() < tolerance * tolerance:
+        length = n.norm()
+        if length > 0:
+            n /= length
+            rise = n.dot(a)
+            bend = h00 * n[0] * n[0] + h11 * n[1] * n[1] + h22 * n[2] * n[2]
+            bend += 2 * (h01 * n[0] * n[1] + h02 * n[0] * n[2] + h12 * n[1] * n[2])
+            size = ti.sqrt(rise * rise + bend * bend)
+            if size > 0:
+                # Half-angle of t = atan2(rise, bend); rise is never negative.
+                cosine = ti.sqrt(ti.max(0.5 + 0.5 * bend / size, 0.0))
+                sine = ti.sqrt(ti.max(0.5 - 0.5 * bend / size, 0.0))
+                if bend > 0:
+                    sine = 0.5 * rise / (size * cosine)
+                turn = ti.Vector([cosine, sine * n[0], sine * n[1], sine * n[2]])
+                q = quaternion_product(q, turn).normalized()
+                if newton and 2 * sine < tolerance:
+                    left = 0
+            else:
+                left = 0
+        else:
             left = 0
     return q

@@ -13,14 +13,15 @@ from dataclasses import dataclass
 import numpy as np
 
 from taichifem import elements
-from taichifem.linear_algebra import assembly, balance, pcg
+from taichifem.linear_algebra import assembly, pcg
 from taichifem.processes import contact, holding
 from taichifem.runtime import ti
 from taichifem.timing import PhaseTimer
 from taichifem.world import Counts, World
 
 ROTATION_ITERATIONS = 40
-CONTACT_PASSES = 8
+CONTACT_PASSES = 12
+FRICTION_RENEWALS = 2
 
 
 @dataclass(frozen=True)
@@ -93,18 +94,19 @@ def advance(
     """
     n = counts.nodes
     report = StepReport()
+    weight = float(np.linalg.norm(gravity))
     _start(w, n)
     first_load = 0.0
     for k in range(options.newton):
         with timer.phase("forces"):
-            elements.deform(w, counts.elements, dt * dt, dt, dt if k == 0 else 0.0, 1.0, ROTATION_ITERATIONS)
+            elements.deform(w, counts.elements, dt * dt, dt, dt if k == 0 else 0.0, 1.0, ROTATION_ITERATIONS, 1)
             _load(w, n, dt, gravity)
             if k > 0:
                 _forget(w, n)
             holding.hold(w, n, counts.held, dt)
         with timer.phase("assembly"):
             assembly.assemble(w, counts.pairs, 1.0, dt)
-        done = _solve_with_contact(w, counts, dt, options, timer, report)
+        done = _solve_with_contact(w, counts, dt, weight, options, timer, report)
         with timer.phase("update"):
             _update(w, n, dt)
         report.linearisations = k + 1
@@ -118,24 +120,39 @@ def advance(
 
 
 def _solve_with_contact(
-    w: World, counts: Counts, dt: float, options: Options, timer: PhaseTimer, report: StepReport
+    w: World, counts: Counts, dt: float, weight: float, options: Options, timer: PhaseTimer, report: StepReport
 ) -> pcg.Convergence:
-    """Solve for dv, again while contacts open or close."""
+    """Solve for dv, again while contacts open, close or slip otherwise, and while friction changes."""
     n = counts.nodes
     noise = float(np.finfo(np.float32 if w.precision == "f32" else np.float64).eps) / dt
+    renewals = 0
     for passes in range(1, CONTACT_PASSES + 1):
         with timer.phase("contact"):
-            holding.clear_springs(w, n)
-            holding.pull(w, counts.pulled, dt)
-            changed = contact.touch(w, n, counts.colliders, dt) if counts.colliders else 0
-        if passes > 1 and not changed:
-            break
+            changed = _springs(w, counts, dt)
+            if passes > 1 and not changed:
+                renewals += 1
+                if renewals > FRICTION_RENEWALS or not contact.press(w, n, counts.colliders, dt, weight):
+                    break
+                _springs(w, counts, dt)
         with timer.phase("solve"):
-            done = pcg.solve(w, n, tolerance=options.tolerance, max_iterations=options.max_iterations, noise=noise)
-            balance.balance(w, counts.bodies, 1.0, dt)
+            done = pcg.solve(
+                w,
+                counts,
+                tolerance=options.tolerance,
+                max_iterations=options.max_iterations,
+                noise=noise,
+                drag_factor=dt,
+            )
         report.iterations += done.iterations
         report.residual, report.converged = done.residual, done.converged
         report.contact_passes = passes
         if not counts.colliders:
             break
     return done
+
+
+def _springs(w: World, counts: Counts, dt: float) -> int:
+    """Handles and contacts for the solution so far; how many contacts changed."""
+    holding.clear_springs(w, counts.nodes)
+    holding.pull(w, counts.pulled, dt)
+    return contact.touch(w, counts.nodes, counts.colliders, dt) if counts.colliders else 0

@@ -1,27 +1,93 @@
-"""The translation of each free body as a one-step coarse space: linear momentum then balances exactly.
+"""The rigid motion of each free body as a one-step coarse space: momentum then balances, whatever the tolerance.
 
-K times a uniform motion is zero, so for a body that nothing pins, the best uniform correction c solves
-sum(m + springs) c = sum(residual). Afterwards the residual sums to zero over the body: whatever tolerance
-the solver stopped at, the impulses on the body are those of the outside world alone.
+K times a uniform motion is zero, so for a body that nothing pins the best uniform correction c of dv solves
+sum(M + springs) c = sum(residual), and linear momentum changes by the impulses of the outside world alone.
+A spin is free of strain only where the body is little deformed; there, what a solver leaves of the large elastic
+forces of a stiff body would spin it up. So the spin that balances the torque is a direction only, and how far to go
+along it takes one product with the matrix.
 """
 
+from taichifem.linear_algebra import matrix
 from taichifem.runtime import ti
+
+HELD, TURNS, LINEAR = 0, 1, 2
+"""What `World.body_flies` says of a body: something pins it; it flies; it flies and all of it is linear, so that
+its spins are those about the rest shape."""
+
+
+@ti.func
+def _cross(r):
+    """The matrix [r] with [r] a = r x a."""
+    return ti.Matrix([[0.0, -r[2], r[1]], [r[2], 0.0, -r[0]], [-r[1], r[0], 0.0]])
+
+
+@ti.func
+def _inertia(w: ti.template(), i: ti.i32, drag_factor):
+    """Mass and springs of node i, (3,3), in double precision."""
+    block = ti.cast(w.spring[i], ti.f64)
+    m = ti.cast(w.mass[i], ti.f64) + drag_factor * ti.cast(w.drag[i], ti.f64)
+    for k in ti.static(range(3)):
+        block[k, k] += m
+    return block
 
 
 @ti.kernel
-def balance(w: ti.template(), n_bodies: ti.i32, mass_factor: ti.f64, drag_factor: ti.f64):
+def translate(w: ti.template(), n_bodies: ti.i32, drag_factor: ti.f64):
     """Add the uniform correction of every body that flies to `w.dv`, and take it out of `w.residual`."""
     for body in range(n_bodies):
         if w.body_flies[body] > 0:
             total, inertia = ti.Vector.zero(ti.f64, 3), ti.Matrix.zero(ti.f64, 3, 3)
             for i in range(w.body_start[body], w.body_start[body + 1]):
                 total += ti.cast(w.residual[i], ti.f64)
-                inertia += ti.cast(w.spring[i], ti.f64)
-                m = mass_factor * ti.cast(w.mass[i], ti.f64) + drag_factor * ti.cast(w.drag[i], ti.f64)
-                for k in ti.static(range(3)):
-                    inertia[k, k] += m
+                inertia += _inertia(w, i, drag_factor)
             c = inertia.inverse() @ total
             for i in range(w.body_start[body], w.body_start[body + 1]):
-                m = mass_factor * ti.cast(w.mass[i], ti.f64) + drag_factor * ti.cast(w.drag[i], ti.f64)
                 w.dv[i] += ti.cast(c, w.real)
-                w.residual[i] -= ti.cast(ti.cast(w.spring[i], ti.f64) @ c + m * c, w.real)
+                w.residual[i] -= ti.cast(_inertia(w, i, drag_factor) @ c, w.real)
+
+
+@ti.func
+def _spin_direction(w: ti.template(), begin: ti.i32, end: ti.i32, at: ti.template(), drag_factor):
+    """Write to `w.direction` the rigid motion about positions `at` that would balance torque and keep momentum."""
+    centre = ti.Vector.zero(ti.f64, 3)
+    for i in range(begin, end):
+        centre += ti.cast(at[i], ti.f64)
+    centre /= end - begin
+    torque = ti.Vector.zero(ti.f64, 3)
+    a, b, c = ti.Matrix.zero(ti.f64, 3, 3), ti.Matrix.zero(ti.f64, 3, 3), ti.Matrix.zero(ti.f64, 3, 3)
+    for i in range(begin, end):
+        r = ti.cast(at[i], ti.f64) - centre
+        torque += r.cross(ti.cast(w.residual[i], ti.f64))
+        inertia = _inertia(w, i, drag_factor)
+        arm = -_cross(r)  # velocity of a spin s about the centre: s x r = arm s
+        a += inertia
+        b += inertia @ arm
+        c += arm.transpose() @ inertia @ arm
+    spin = (c - b.transpose() @ a.inverse() @ b).inverse() @ torque
+    shift = -(a.inverse() @ (b @ spin))
+    for i in range(begin, end):
+        w.direction[i] = ti.cast(shift + spin.cross(ti.cast(at[i], ti.f64) - centre), w.real)
+
+
+@ti.kernel
+def spin(w: ti.template(), n: ti.i32, n_bodies: ti.i32, drag_factor: ti.f64):
+    """After `translate`: turn every body that flies as far as makes its residual smallest; spends the residual."""
+    for body in range(n_bodies):
+        if w.body_flies[body] == TURNS:
+            _spin_direction(w, w.body_start[body], w.body_start[body + 1], w.x, drag_factor)
+        elif w.body_flies[body] == LINEAR:
+            _spin_direction(w, w.body_start[body], w.body_start[body + 1], w.rest, drag_factor)
+        else:
+            for i in range(w.body_start[body], w.body_start[body + 1]):
+                w.direction[i] = ti.Vector.zero(w.real, 3)
+    for i in range(n):
+        w.product[i] = matrix.row(w, w.direction, i)
+    for body in range(n_bodies):
+        if w.body_flies[body] > 0:
+            slope, curvature = ti.cast(0.0, ti.f64), ti.cast(0.0, ti.f64)
+            for i in range(w.body_start[body], w.body_start[body + 1]):
+                slope += ti.cast(w.direction[i].dot(w.residual[i]), ti.f64)
+                curvature += ti.cast(w.direction[i].dot(w.product[i]), ti.f64)
+            if curvature > 0:
+                for i in range(w.body_start[body], w.body_start[body + 1]):
+                    w.dv[i] += ti.cast(slope / curvature, w.real) * w.direction[i]

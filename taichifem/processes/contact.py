@@ -1,30 +1,36 @@
 """Contact of nodes with rigid colliders: implicit normal springs and regularised Coulomb friction.
 
-A node that ends the step inside a collider is pushed out by a spring along the normal, whose stiffness goes with
-the node's own: about `STIFFNESS` times it, or times its inertia m / dt^2 where that is larger. Friction is a spring
+A node that ends the step inside a collider is pushed out by a spring along the normal, `STIFFNESS` times as stiff as
+the node itself: a soft body sinks in by a tenth of what it gives way. It need never be stiffer than what stops the
+whole body within a step, M / dt^2, nor softer than what stops the node, m / dt^2. Friction is a spring
 too, from the place where the node began to stick, and slips when it passes mu times the normal force; its stretch
 is kept from step to step, so that a body at rest on a slope stays there (Cundall & Strack 1979). Both are taken
-at the end of the step, and which nodes touch is settled by solving again while that still changes.
+at the end of the step, and which nodes touch and slip is settled by solving again while that still changes. The
+normal forces that limit friction start from those of the last step and are renewed once the contacts have settled;
+renewing them in every solve can run away, since friction itself tips weight from node to node.
 """
 
-from taichifem.formulas import signed_distance
+from taichifem.formulas import collision
 from taichifem.runtime import ti
 
 STIFFNESS = 10.0
 NONE, STICKS, SLIPS = 0, 1, 2
+FRICTION_TOLERANCE = 0.03
+"""Share of the normal force by which friction may be off before the step is solved again."""
 
 
 @ti.func
-def _gap(w: ti.template(), c: ti.i32, position):
-    """Signed distance [m] of a position to collider c at the end of the step, and the outward normal."""
+def _gap(w: ti.template(), c: ti.i32, start, end):
+    """How far [m] a node that moves from `start` to `end` ends outside of collider c, and the outward normal."""
     R = w.collider_rotation[c]
-    p = R.transpose() @ (position - w.collider_center[c])
-    distance, normal = signed_distance.to_half_space(p)
-    if w.collider_kind[c] == signed_distance.SPHERE:
-        distance, normal = signed_distance.to_sphere(p, w.collider_size[c][0])
-    elif w.collider_kind[c] == signed_distance.BOX:
-        distance, normal = signed_distance.to_box(p, 0.5 * w.collider_size[c])
-    return distance, R @ normal
+    p0 = w.collider_rotation0[c].transpose() @ (start - w.collider_center0[c])
+    p1 = R.transpose() @ (end - w.collider_center[c])
+    gap, normal = collision.gap_to_half_space(p1)
+    if w.collider_kind[c] == collision.SPHERE:
+        gap, normal = collision.gap_to_sphere(p0, p1, w.collider_size[c][0])
+    elif w.collider_kind[c] == collision.BOX:
+        gap, normal = collision.gap_to_box(p0, p1, 0.5 * w.collider_size[c])
+    return gap, R @ normal
 
 
 @ti.func
@@ -37,14 +43,16 @@ def _drift(w: ti.template(), c: ti.i32, position, velocity):
 @ti.func
 def _spring(w: ti.template(), i: ti.i32, dt):
     """Stiffness [N/m] of the contact springs of node i."""
-    return ti.cast(STIFFNESS, w.real) * ti.max(w.contact_stiffness[i], w.mass[i] / (dt * dt))
+    inertia = 1 / (dt * dt)
+    own = ti.min(w.contact_stiffness[i], w.body_mass[i] * inertia)
+    return ti.cast(STIFFNESS, w.real) * ti.max(own, w.mass[i] * inertia)
 
 
 @ti.func
 def _state(w: ti.template(), c: ti.i32, i: ti.i32, dt, velocity):
     """Touching or not, normal force [N], normal, and stretch of the friction spring, at the end velocity."""
     position = w.x0[i] + dt * velocity
-    distance, normal = _gap(w, c, position)
+    distance, normal = _gap(w, c, w.x0[i], position)
     state = NONE
     force = ti.cast(0.0, w.real)
     stretch = ti.Vector.zero(w.real, 3)
@@ -53,13 +61,16 @@ def _state(w: ti.template(), c: ti.i32, i: ti.i32, dt, velocity):
         force = -k * distance
         stretch = w.slip[c, i] + dt * _drift(w, c, position, velocity)
         stretch -= stretch.dot(normal) * normal
-        state = SLIPS if k * stretch.norm() > w.collider_friction[c] * force else STICKS
+        state = SLIPS if k * stretch.norm() > w.collider_friction[c] * w.pressed[c, i] else STICKS
     return state, force, normal, stretch
 
 
 @ti.kernel
 def touch(w: ti.template(), n: ti.i32, n_colliders: ti.i32, dt: ti.f64) -> ti.i32:
-    """Add contact springs for the end velocity `w.v + w.dv` guessed so far; counts the contacts that changed."""
+    """Add contact springs for the end velocity `w.v + w.dv` guessed so far.
+
+    Returns how many contacts opened, closed, began or ceased to slip since the last call.
+    """
     changed = 0
     for i in range(n):
         step = ti.cast(dt, w.real)
@@ -72,16 +83,35 @@ def touch(w: ti.template(), n: ti.i32, n_colliders: ti.i32, dt: ti.f64) -> ti.i3
             if state != NONE:
                 k = _spring(w, i, step)
                 # Where it slips, a spring as soft as gives the force mu N: it opposes the motion, and cannot
-                # throw the node back.
-                stretched = stretch.norm()
+                # throw the node back. With N held fixed these springs majorise the friction potential, which is
+                # convex, so solving again descends.
                 side = k
                 if state == SLIPS:
-                    side = w.collider_friction[c] * force / stretched
+                    side = w.collider_friction[c] * w.pressed[c, i] / stretch.norm()
                 along = normal.outer_product(normal)
                 stiffness = (k - side) * along + side * ti.Matrix.identity(w.real, 3)
+                w.sprung[i] = 1
                 w.spring[i] += step * step * stiffness
                 # Both forces are written for dv = 0: what `dv` adds to them stands in the matrix.
                 w.spring_load[i] += step * (force * normal - side * stretch + step * (stiffness @ w.dv[i]))
+    return changed
+
+
+@ti.kernel
+def press(w: ti.template(), n: ti.i32, n_colliders: ti.i32, dt: ti.f64, weight: ti.f64) -> ti.i32:
+    """Set the normal forces that limit friction from the end velocity `w.v + w.dv`.
+
+    Returns for how many contacts that matters: `weight` [m/s^2] times the mass is a force that does.
+    """
+    changed = 0
+    for i in range(n):
+        step = ti.cast(dt, w.real)
+        for c in range(n_colliders):
+            _, force, _, _ = _state(w, c, i, step, w.v[i] + w.dv[i])
+            share = ti.cast(FRICTION_TOLERANCE, w.real)
+            if ti.abs(force - w.pressed[c, i]) > share * (force + w.mass[i] * ti.cast(weight, w.real)):
+                changed += 1
+            w.pressed[c, i] = force
     return changed
 
 
@@ -92,7 +122,10 @@ def slide(w: ti.template(), n: ti.i32, n_colliders: ti.i32, dt: ti.f64):
         step = ti.cast(dt, w.real)
         for c in range(n_colliders):
             state, force, _, stretch = _state(w, c, i, step, w.v[i])
+            most = w.collider_friction[c] * force
+            held = _spring(w, i, step) * stretch.norm()
+            if held > most:
+                stretch *= most / held
             w.touching[c, i] = state
-            if state == SLIPS:
-                stretch *= w.collider_friction[c] * force / (_spring(w, i, step) * stretch.norm())
+            w.pressed[c, i] = force
             w.slip[c, i] = stretch

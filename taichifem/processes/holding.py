@@ -33,6 +33,7 @@ def pull(w: ti.template(), n_pulled: ti.i32, dt: ti.f64):
         k = w.pulled_stiffness[p]
         step = ti.cast(dt, w.real)
         target = w.pose_rotation[pose] @ w.rest[i] + w.pose_offset[pose]
+        w.sprung[i] = 1
         w.spring_load[i] += step * k * (target - w.x0[i] - step * w.v[i])
         for a in ti.static(range(3)):
             w.spring[i][a, a] += step * step * k
@@ -44,3 +45,4 @@ def clear_springs(w: ti.template(), n: ti.i32):
     for i in range(n):
         w.spring[i] = ti.Matrix.zero(w.real, 3, 3)
         w.spring_load[i] = ti.Vector.zero(w.real, 3)
+        w.sprung[i] = 0

@@ -1,0 +1,70 @@
+"""The tables of `taichifem bench`."""
+
+from __future__ import annotations
+
+from taichifem.app.console import console, table
+
+
+def print_report(rows: list[dict]) -> None:
+    """Print two tables: what a step takes, and what surrounds it."""
+    screen = console()
+    screen.print("Time per step: median (10th to 90th percentile) [ms], of which in each phase", _steps(rows), sep="\n")
+    screen.print("\nStart, memory, result", _start(rows), sep="\n")
+    probes = ", ".join(f"{row['probe_ms']:.1f}" for row in rows)
+    screen.print(f"\nSpeed of the machine meanwhile: a fixed piece of NumPy took {probes} ms.")
+
+
+def _steps(rows: list[dict]):
+    phases = list(dict.fromkeys(name for row in rows for name in row["phases_ms"]))
+    right = ("E [Pa]", "steps", "ms a step", *phases, "CG iterations", "residual", "x real time")
+    listing = table("tets", *right, right=("tets", *right))
+    for row in rows:
+        ms, counts = row["ms"], row["iterations"]
+        capped = f", {row['capped_steps']} capped" if row["capped_steps"] else ""
+        listing.add_row(
+            f"{row['tets']:,}",
+            f"{row['youngs']:g}",
+            str(row["steps"]),
+            f"{ms['median']:.2f} ({ms['p10']:.2f}-{ms['p90']:.2f})",
+            *(f"{row['phases_ms'][name]['median']:.2f}" if name in row["phases_ms"] else "" for name in phases),
+            f"{counts['median']:.0f} (most {counts['max']}{capped})",
+            f"{row['residual']:.1e}",
+            f"{row['real_time_factor']:.2f}",
+        )
+    return listing
+
+
+def _start(rows: list[dict]):
+    columns = (
+        "tets",
+        "E [Pa]",
+        "nodes",
+        "set-up [s]",
+        "cold",
+        "first step [s]",
+        "cold",
+        "peak [MiB]",
+        "tip, lowest [m]",
+        "at the end",
+        "static, small strain",
+    )
+    listing = table(*columns, right=columns)
+    for row in rows:
+        listing.add_row(
+            f"{row['tets']:,}",
+            f"{row['youngs']:g}",
+            f"{row['nodes']:,}",
+            f"{row['setup_s']:.2f}",
+            _or_dash(row["cold_setup_s"]),
+            f"{row['first_step_s']:.2f}",
+            _or_dash(row["cold_first_step_s"]),
+            f"{row['peak_mib']:.0f}",
+            f"{row['tip_lowest_m']:.4f}",
+            f"{row['tip_m']:.4f}",
+            f"{row['timoshenko_m']:.4f}",
+        )
+    return listing
+
+
+def _or_dash(seconds: float | None) -> str:
+    return "-" if seconds is None else f"{seconds:.2f}"

@@ -1,0 +1,156 @@
+"""The command `taichifem`. Thin: each command imports what does the work when it is called."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+import click
+
+from taichifem import __version__
+from taichifem.app.options import FILE, MODELS, machine_options, run_options
+from taichifem.app.program import INTERRUPTED, Program
+
+EXAMPLES = """
+\b
+Examples:
+  taichifem demo                                  what there is to see
+  taichifem demo hello                            writes out/hello.mp4
+  taichifem run scene.toml -o fall.mp4 --seconds 3
+  taichifem run scene.toml --set body.0.material.youngs=2e5 --color von-mises
+  taichifem mesh surface.obj -o solid.vtu --tets 5000
+"""
+
+
+@click.group(
+    cls=Program,
+    invoke_without_command=True,
+    epilog=EXAMPLES,
+    context_settings={"help_option_names": ["-h", "--help"], "max_content_width": 110},
+)
+@click.version_option(__version__, "-V", "--version", message="%(prog)s %(version)s")
+@click.pass_context
+def cli(ctx: click.Context) -> None:
+    """Simulate elasto-plastic, breaking solids with finite elements.
+
+    Lengths are in metres, times in seconds, stresses in pascals; z points up.
+    """
+    if ctx.invoked_subcommand is None:
+        click.echo(ctx.get_help())
+
+
+@cli.command()
+@click.argument("scene", type=click.Path(path_type=Path))
+@run_options
+@click.pass_context
+def run(ctx: click.Context, scene: Path, **options: Any) -> None:
+    """Run a scene file and write a video.
+
+    SCENE is a TOML file: bodies, materials, what holds and what hits them.
+
+    Ctrl-C ends the run after the frame in work and leaves a video that plays.
+
+    \b
+    Examples:
+      taichifem run scene.toml
+      taichifem run scene.toml --no-video --export meshes --format vtu --stats figures.jsonl
+      taichifem run scene.toml --checkpoint half.npz --frames 60
+      taichifem run scene.toml --resume half.npz --frames 120
+    """
+    _run(ctx, scene, options)
+
+
+@cli.command()
+@click.argument("name", required=False)
+@run_options
+@click.pass_context
+def demo(ctx: click.Context, name: str | None, **options: Any) -> None:
+    """Run a demo, or list the demos.
+
+    Without NAME, prints what there is; with it, runs that demo as `taichifem run` would.
+
+    \b
+    Example:
+      taichifem demo hello --size 640x360 --color speed
+    """
+    from taichifem.app.demos import demos, find_demo
+
+    if name is not None:
+        _run(ctx, find_demo(name).path, options)
+        return
+    from taichifem.app.console import console, table
+
+    listing = table("demo", "what it shows")
+    for entry in demos().values():
+        listing.add_row(entry.name, entry.description or entry.title)
+    console().print(listing if listing.rows else "no demos are installed")
+
+
+def _run(ctx: click.Context, scene: Path, options: dict[str, Any]) -> None:
+    from taichifem.app.run import RunOptions, run_scene
+
+    if run_scene(scene, RunOptions(**options)).interrupted:
+        ctx.exit(INTERRUPTED)
+
+
+@cli.command()
+@click.argument("source", metavar="IN")
+@click.option("-o", "--output", type=FILE, metavar="OUT", help="Where to write: .vtu, .vtk, .msh, .mesh, .inp ...")
+@click.option("--tets", type=click.IntRange(min=10), metavar="N", help="About how many tetrahedra fill a surface.")
+def mesh(source: str, output: Path | None, tets: int | None) -> None:
+    """Check, convert or make a tetrahedral mesh.
+
+    Prints how good the mesh IN is, and writes it to OUT if that is given.
+
+    IN is a volume mesh (.msh .vtk .vtu .mesh .inp .node .ele .veg), which is converted, or a closed surface
+    (.stl .obj .ply .glb), which is filled with tetrahedra.
+
+    \b
+    Examples:
+      taichifem mesh duck.ele
+      taichifem mesh spot.obj --tets 5000 -o spot.vtu
+    """
+    from taichifem.mesh import TetMesh, report
+
+    solid = TetMesh.from_file(source, tets=tets)
+    click.echo(report(solid))
+    if output is not None:
+        solid.write(output)
+        click.echo(f"wrote {output}")
+
+
+@cli.command()
+def info() -> None:
+    """Say what works here, and what will be used."""
+    from taichifem.app.info import show_info
+
+    show_info()
+
+
+@cli.command()
+@click.option("--sizes", default="1k,5k,20k,100k", show_default=True, help="Numbers of tetrahedra, roughly met.")
+@click.option("--stiffness", default="1e6", show_default=True, help="Young's moduli [Pa], separated by commas.")
+@click.option("--model", type=click.Choice(MODELS), default="corotational", show_default=True, help="Of the material.")
+@click.option("--steps", type=click.IntRange(min=1), default=60, show_default=True, help="Timed steps, at most.")
+@click.option("--budget", type=float, default=45.0, show_default=True, help="Seconds for them, at most.")
+@click.option("--no-cold", is_flag=True, help="Leave out the start with an empty kernel cache.")
+@click.option("--json", "json_file", type=FILE, metavar="FILE", help="Write all figures to this file, too.")
+@machine_options
+def bench(**options: Any) -> None:
+    """Measure speed, start-up and memory.
+
+    Each bar (1 x 0.25 x 0.25 m, one end held, released at rest, 60 steps a second) runs in a process of its own.
+
+    \b
+    Examples:
+      taichifem bench --sizes 1k,5k --no-cold
+      taichifem bench --stiffness 1e5,1e6,1e7 --json bench.json
+    """
+    from taichifem.app.bench import run_bench
+
+    run_bench(**options)
+
+
+def main() -> None:
+    """The console command."""
+    cli.main(prog_name="taichifem")

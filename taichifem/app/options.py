@@ -1,0 +1,98 @@
+"""Options that commands share. Nothing heavy is imported, so that `--help` is quick."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import click
+
+# The packages that own these lists take a second to import; a test compares.
+ARCHES = ("cpu", "cuda", "vulkan", "metal")
+PRECISIONS = ("f32", "f64")
+MODELS = ("linear", "corotational")
+RENDERERS = ("auto", "taichi", "ggui", "pyvista")
+COLORS = ("material", "von-mises", "displacement", "speed")
+EXPORTS = ("vtu", "ply", "obj", "npz")
+
+FILE = click.Path(dir_okay=False, path_type=Path)
+
+
+class Size(click.ParamType):
+    """Width and height in pixels, as in 1280x720."""
+
+    name = "WxH"
+
+    def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> tuple[int, int]:
+        if isinstance(value, tuple):
+            return value
+        match = re.fullmatch(r"(\d{1,5})[xX](\d{1,5})", value.strip())
+        if match is None or not all(16 <= int(side) <= 8192 for side in match.groups()):
+            self.fail(f"{value!r}: write WIDTHxHEIGHT in pixels, each 16 to 8192, like 1280x720", param, ctx)
+        return int(match[1]), int(match[2])
+
+
+def together(*decorators: Callable) -> Callable:
+    """One decorator from several, which then stand in the help in that order."""
+
+    def decorate(function: Callable) -> Callable:
+        for decorator in reversed(decorators):
+            function = decorator(function)
+        return function
+
+    return decorate
+
+
+machine_options = together(
+    click.option("--arch", type=click.Choice(ARCHES), help="What to compute on.  [default: cpu]"),
+    click.option("--threads", type=click.IntRange(min=1), metavar="N", help="CPU threads.  [default: all cores]"),
+    click.option(
+        "--precision", type=click.Choice(PRECISIONS), default="f32", show_default=True, help="Of all numbers."
+    ),
+)
+
+run_options = together(
+    click.option(
+        "--set",
+        "overrides",
+        multiple=True,
+        metavar="KEY=VALUE",
+        help="Change the scene, as in body.0.material.youngs=2e5. May be given again.",
+    ),
+    click.option(
+        "--seconds", type=float, metavar="T", help="Run until this simulated time [s].  [default: the scene's]"
+    ),
+    click.option("--frames", type=click.IntRange(min=1), metavar="N", help="Run until this frame instead."),
+    click.option(
+        "--fps", type=float, metavar="F", help="Frames a second; the time step follows.  [default: the scene's]"
+    ),
+    click.option(
+        "-o",
+        "--output",
+        type=click.Path(path_type=str),
+        metavar="FILE",
+        help="Video: .mp4, .gif, .webp, or numbered .png.  [default: out/NAME.mp4]",
+    ),
+    click.option("--no-video", is_flag=True, help="Draw nothing."),
+    click.option(
+        "--size", type=Size(), metavar="WxH", default="1280x720", show_default=True, help="Of the picture [pixels]."
+    ),
+    click.option("--renderer", type=click.Choice(RENDERERS), default="auto", show_default=True, help="Who draws."),
+    click.option("--color", type=click.Choice(COLORS), help="What colours show.  [default: the scene's]"),
+    click.option("--wire/--no-wire", default=None, help="Draw the edges of elements, or do not."),
+    click.option(
+        "--export",
+        type=click.Path(file_okay=False, path_type=Path),
+        metavar="DIR",
+        help="Write the mesh of each frame.",
+    ),
+    click.option("--format", "export_format", type=click.Choice(EXPORTS), help="Of --export.  [default: vtu]"),
+    click.option("--stats", type=FILE, metavar="FILE", help="Write a line of JSON for each frame."),
+    click.option("--checkpoint", type=FILE, metavar="FILE", help="Write the state at the end and on Ctrl-C."),
+    click.option("--checkpoint-every", type=click.IntRange(min=1), metavar="N", help="... and every N frames."),
+    click.option("--resume", type=FILE, metavar="FILE", help="Go on from a checkpoint of the same scene."),
+    machine_options,
+    click.option("-q", "--quiet", is_flag=True, help="Print nothing but errors."),
+)

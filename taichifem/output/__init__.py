@@ -1,0 +1,1 @@
+"""Pictures, videos, mesh sequences and statistics out of a simulation."""

@@ -1,0 +1,312 @@
+"""Kernels of the rasteriser: the light on what is seen, one pixel at a time, from the visibility buffer.
+
+Linear light throughout; the encoding table makes sRGB of the mean. A pixel is shaded once for each thing
+seen in it (triangle, ground or background), at the mean of the samples that see it, so that supersampling
+costs only where something ends.
+"""
+
+from taichifem.output.colors import ENCODING_SIZE, KNEE
+from taichifem.output.raster_kernels import (
+    Corners,
+    Grid,
+    Keys,
+    Layout,
+    Matrices,
+    Points,
+    Triangles,
+    edge_functions,
+    mat4,
+    project,
+    vec3,
+)
+from taichifem.runtime import ti
+
+vec2 = ti.types.vector(2, ti.f32)
+Pixels = ti.types.ndarray(dtype=ti.u8, ndim=3)
+Table = ti.types.ndarray(dtype=ti.f32, ndim=1)
+
+GROUND = -1
+BACKGROUND = -2
+CAMERA_VIEW, LIGHT_VIEW = 0, 1
+
+Look = ti.types.struct(
+    eye=vec3,
+    right=vec3,
+    up=vec3,
+    forward=vec3,
+    focal=ti.f32,  # pixels
+    samples=ti.i32,  # along a pixel's side
+    to_light=vec3,
+    key=vec3,
+    sky=vec3,
+    fill=vec3,
+    horizon=vec3,
+    zenith=vec3,
+    has_ground=ti.i32,
+    ground=vec3,
+    ground_u=vec3,
+    ground_v=vec3,
+    ground_normal=vec3,
+    floor_color=vec3,
+    line_color=vec3,
+    spacing=ti.f32,  # of the lines on the ground [m]
+    middle=vec2,  # of the picture's subject on the ground, along u and v [m]
+    fade=ti.f32,  # distance over which the ground goes into the background [m]
+    patch=vec2,  # first corner of the occlusion grid, along u and v [m]
+    patch_texel=ti.f32,  # [m]
+    shadow_texel=ti.f32,  # [m]
+    wired=ti.i32,  # triangles below this number show their edges
+    wire_width=ti.f32,  # pixels
+)
+
+
+@ti.func
+def ray(look: Look, x: ti.f32, y: ti.f32, width: ti.i32, height: ti.i32) -> vec3:
+    """Direction through pixel position (x, y), of depth 1."""
+    dx = (x - 0.5 * ti.cast(width, ti.f32)) / look.focal
+    dy = (y - 0.5 * ti.cast(height, ti.f32)) / look.focal
+    return look.forward + dx * look.right - dy * look.up
+
+
+@ti.func
+def ground_depth(look: Look, direction: vec3) -> ti.f32:
+    """Depth at which the ray meets the ground from above, or -1."""
+    depth = -1.0
+    down = direction.dot(look.ground_normal)
+    over = (look.ground - look.eye).dot(look.ground_normal)
+    if look.has_ground == 1 and over < 0 and down < 0:
+        depth = over / down
+    return depth
+
+
+@ti.func
+def sunlit(keys: ti.template(), layout: ti.template(), m: mat4, p: vec3, slack: ti.f32) -> ti.f32:
+    """Share of the key light that reaches p: a tent-weighted mean over 6 x 6 texels of the shadow map."""
+    light = 1.0
+    side, start = layout[LIGHT_VIEW][0], layout[LIGHT_VIEW][2]
+    q = project(m, p)
+    x = q[0] + 0.5 * ti.cast(side, ti.f32) - 0.5
+    y = q[1] + 0.5 * ti.cast(side, ti.f32) - 0.5
+    ix = ti.cast(ti.floor(x), ti.i32)
+    iy = ti.cast(ti.floor(y), ti.i32)
+    if ix >= 2 and iy >= 2 and ix < side - 3 and iy < side - 3:
+        fx = x - ti.cast(ix, ti.f32)
+        fy = y - ti.cast(iy, ti.f32)
+        limit = ti.cast(ti.bit_cast(ti.max(q[3] - slack, 0.0), ti.i32), ti.i64) << 32
+        total = 0.0
+        for j in range(-2, 4):
+            row = 0.0
+            for i in ti.static(range(-2, 4)):
+                if keys[start + (iy + j) * side + ix + i] >= limit:
+                    row += ti.max(3.0 - ti.abs(i - fx), 0.0)
+            total += row * ti.max(3.0 - ti.abs(ti.cast(j, ti.f32) - fy), 0.0)
+        light = total / 81.0
+    return light
+
+
+@ti.func
+def sky_left(occlusion: ti.template(), look: Look, p: vec3) -> ti.f32:
+    """Share of the sky seen from the ground below p, between the texels of the occlusion grid."""
+    side = occlusion.shape[0]
+    x = ((p - look.ground).dot(look.ground_u) - look.patch[0]) / look.patch_texel - 0.5
+    y = ((p - look.ground).dot(look.ground_v) - look.patch[1]) / look.patch_texel - 0.5
+    left = 1.0
+    ix = ti.cast(ti.floor(x), ti.i32)
+    iy = ti.cast(ti.floor(y), ti.i32)
+    if look.has_ground == 1 and ix >= 0 and iy >= 0 and ix < side - 1 and iy < side - 1:
+        fx = x - ti.cast(ix, ti.f32)
+        fy = y - ti.cast(iy, ti.f32)
+        top = occlusion[iy, ix] * (1 - fx) + occlusion[iy, ix + 1] * fx
+        bottom = occlusion[iy + 1, ix] * (1 - fx) + occlusion[iy + 1, ix + 1] * fx
+        left = 1 - (top * (1 - fy) + bottom * fy)
+    return left
+
+
+@ti.func
+def line_share(x: ti.f32, footprint: ti.f32, width: ti.f32) -> ti.f32:
+    """How much of [x - footprint/2, x + footprint/2] lies on lines of `width` about the whole numbers."""
+    a = x - 0.5 * footprint + 0.5 * width
+    b = a + footprint
+    below_a = ti.floor(a) * width + ti.min(a - ti.floor(a), width)
+    below_b = ti.floor(b) * width + ti.min(b - ti.floor(b), width)
+    return (below_b - below_a) / footprint
+
+
+@ti.func
+def background(look: Look, direction: vec3) -> vec3:
+    rise = direction.normalized()[2]
+    return ti.math.mix(look.horizon, look.zenith, ti.math.smoothstep(-0.1, 0.7, rise))
+
+
+@ti.func
+def ground_light(
+    keys: ti.template(),
+    layout: ti.template(),
+    shadow: mat4,
+    occlusion: ti.template(),
+    look: Look,
+    direction: vec3,
+    beside: vec3,
+    below: vec3,
+) -> vec3:
+    """Light from the ground along `direction`; beside, below: directions one pixel on, for the footprint."""
+    p = look.eye + ground_depth(look, direction) * direction
+    local = vec2((p - look.ground).dot(look.ground_u), (p - look.ground).dot(look.ground_v))
+    away = (local - look.middle).norm() / look.fade
+    light = background(look, direction)
+    # Past the fade the floor is the background: no shadow to look up, no lines to draw.
+    if away < 1.0:
+        footprint = vec2(0.0, 0.0)
+        for k in ti.static(range(2)):
+            other = beside if k == 0 else below
+            depth = ground_depth(look, other)
+            step = look.eye + ti.select(depth > 0, depth, 1e6) * other - p
+            footprint[0] += ti.abs(step.dot(look.ground_u))
+            footprint[1] += ti.abs(step.dot(look.ground_v))
+        at = local / look.spacing
+        wide = ti.math.clamp(footprint / look.spacing, 1e-5, 1e3)
+        lines = ti.max(
+            line_share(at[0], wide[0], 0.012),
+            line_share(at[1], wide[1], 0.012),
+        )
+        albedo = ti.math.mix(look.floor_color, look.line_color, lines)
+        facing = ti.max(look.ground_normal.dot(look.to_light), 0.0)
+        sun = sunlit(keys, layout, shadow, p, 0.5 * look.shadow_texel)
+        lit = albedo * (facing * sun * look.key + sky_left(occlusion, look, p) * look.sky)
+        light = ti.math.mix(lit, light, ti.math.smoothstep(0.25, 1.0, away))
+    return light
+
+
+@ti.func
+def surface_light(
+    keys: ti.template(),
+    layout: ti.template(),
+    shadow: mat4,
+    occlusion: ti.template(),
+    look: Look,
+    p: vec3,
+    direction: vec3,
+    normal: vec3,
+    albedo: vec3,
+) -> vec3:
+    """Light from a point p of a solid: key light with shadow, sky above, bounce from the ground below."""
+    view = -direction.normalized()
+    n = ti.select(normal.dot(view) < 0, -normal, normal)
+    facing = n.dot(look.to_light)
+    sun = 0.0
+    if facing > 0:
+        # Stepping off along the normal, the more the flatter the light, keeps a surface out of its own shadow.
+        off = look.shadow_texel * (1.5 + 4.0 * (1 - facing))
+        sun = sunlit(keys, layout, shadow, p + off * n, look.shadow_texel)
+    facing = ti.max(facing, 0.0)
+    up = 0.5 + 0.5 * n[2]
+    left = sky_left(occlusion, look, p)
+    bounce = look.floor_color * (0.35 + 0.65 * left) * left
+    ambient = look.sky * ti.math.mix(0.62 * bounce, vec3(1.0, 1.0, 1.0), up)
+    half = (look.to_light + view).normalized()
+    shine = ti.max(n.dot(half), 0.0)
+    for _ in ti.static(range(5)):
+        shine *= shine
+    rim = ti.math.clamp(1 - n.dot(view), 0.0, 1.0)
+    rim *= rim * rim
+    fill = look.fill * ti.max(-n.dot(look.to_light) * 0.6 + n.dot(view) * 0.4, 0.0)
+    diffuse = albedo * (facing * sun * look.key + ambient + fill)
+    return diffuse + 0.16 * shine * sun * look.key + 0.12 * rim * look.sky * up
+
+
+@ti.kernel
+def shade(
+    keys: Keys,
+    layout: Layout,
+    matrices: Matrices,
+    look: Look,
+    points: Points,
+    triangles: Triangles,
+    normals: Corners,
+    colors: Corners,
+    occlusion: Grid,
+    encoding: Table,
+    out: Pixels,
+):
+    """Picture (height,width,3) from the keys of the camera's view (samples^2 a pixel)."""
+    height, width = out.shape[0], out.shape[1]
+    n = look.samples
+    for py, px in ti.ndrange(height, width):
+        camera = matrices[CAMERA_VIEW]
+        shadow = matrices[LIGHT_VIEW]
+        scale = 1.0 / ti.cast(n, ti.f32)
+        seen = ti.Vector([BACKGROUND, BACKGROUND, BACKGROUND, BACKGROUND])
+        for s in range(n * n):
+            sx = px * n + s % n
+            sy = py * n + s // n
+            key = keys[layout[CAMERA_VIEW][2] + sy * layout[CAMERA_VIEW][0] + sx]
+            depth = ti.bit_cast(ti.cast(key >> 32, ti.i32), ti.f32)
+            x = (ti.cast(sx, ti.f32) + 0.5) * scale
+            y = (ti.cast(sy, ti.f32) + 0.5) * scale
+            floor = ground_depth(look, ray(look, x, y, width, height))
+            # Empty keys hold a NaN for depth, before which everything is nearer.
+            if floor > 0 and not (depth <= floor):
+                seen[s] = GROUND
+            elif depth > 0:
+                seen[s] = ti.cast(key & ti.i64(0x7FFFFFFF), ti.i32)
+        picture = vec3(0.0, 0.0, 0.0)
+        for s in range(n * n):
+            thing = seen[s]
+            share = 0
+            x = 0.0
+            y = 0.0
+            first = True
+            for r in range(n * n):
+                if seen[r] == thing:
+                    first = first and r >= s
+                    share += 1
+                    x += ti.cast(px, ti.f32) + (ti.cast(r % n, ti.f32) + 0.5) * scale
+                    y += ti.cast(py, ti.f32) + (ti.cast(r // n, ti.f32) + 0.5) * scale
+            if first:
+                x /= ti.cast(share, ti.f32)
+                y /= ti.cast(share, ti.f32)
+                direction = ray(look, x, y, width, height)
+                light = vec3(0.0, 0.0, 0.0)
+                if thing == BACKGROUND:
+                    light = background(look, direction)
+                elif thing == GROUND:
+                    beside = ray(look, x + 1, y, width, height)
+                    below = ray(look, x, y + 1, width, height)
+                    light = ground_light(keys, layout, shadow, occlusion, look, direction, beside, below)
+                else:
+                    corner = triangles[thing]
+                    a = points[corner[0]]
+                    b = points[corner[1]]
+                    c = points[corner[2]]
+                    e = edge_functions(project(camera, a), project(camera, b), project(camera, c))
+                    q = vec3(
+                        (x - 0.5 * ti.cast(width, ti.f32)) * ti.cast(n, ti.f32),
+                        (y - 0.5 * ti.cast(height, ti.f32)) * ti.cast(n, ti.f32),
+                        1.0,
+                    )
+                    across = e @ q
+                    weight = ti.max(across, 0.0)
+                    weight /= ti.max(weight.sum(), 1e-30)
+                    p = weight[0] * a + weight[1] * b + weight[2] * c
+                    normal = vec3(0.0, 0.0, 0.0)
+                    albedo = vec3(0.0, 0.0, 0.0)
+                    for k in ti.static(range(3)):
+                        normal += weight[k] * normals[thing, k]
+                        albedo += weight[k] * colors[thing, k]
+                    normal /= ti.max(normal.norm(), 1e-30)
+                    light = surface_light(keys, layout, shadow, occlusion, look, p, direction, normal, albedo)
+                    if thing < look.wired:
+                        closest = 1e9
+                        for k in ti.static(range(3)):
+                            slope = ti.sqrt(e[k, 0] * e[k, 0] + e[k, 1] * e[k, 1])
+                            closest = ti.min(closest, across[k] * scale / ti.max(slope, 1e-30))
+                        line = ti.math.clamp(0.5 * look.wire_width + 0.5 - closest, 0.0, 1.0)
+                        light *= 1 - 0.55 * line
+                # Developed before the mean, or a highlight's edge would look jagged; encoded after it.
+                over = ti.max(light - KNEE, 0.0)
+                level = ti.min(light, KNEE) + over / (1 + over / (1 - KNEE))
+                picture += ti.cast(share, ti.f32) * level
+        for k in ti.static(range(3)):
+            mean = ti.math.clamp(picture[k] * scale * scale, 0.0, 1.0)
+            index = ti.cast(ti.sqrt(mean) * (ENCODING_SIZE - 1) + 0.5, ti.i32)
+            out[py, px, k] = ti.cast(encoding[index] + 0.5, ti.u8)
