@@ -30,7 +30,7 @@ def frames_of(simulation: tf.Simulation):
         yield simulation
 
 
-@pytest.mark.parametrize("name", parameters())
+@pytest.mark.parametrize("name", list(parameters()))
 def test_demo(name):
     scene = tf.Scene.from_file(str(DEMOS / f"{name}.toml"))
     assert scene.description

@@ -2,7 +2,7 @@
 
 import numpy as np
 import pytest
-from conftest import random_rotation
+from motions import random_rotation
 
 import taichifem as tf
 
@@ -165,7 +165,7 @@ def test_inverted_element_is_pushed_back():
     pushed[3] = [0.3, 0.3, -0.6]
     simulation.set_positions(pushed)
     simulation.advance(seconds=4.0)
-    from conftest import rigid_misfit
+    from motions import rigid_misfit
 
     assert rigid_misfit(points, simulation.positions) < 1e-3
 

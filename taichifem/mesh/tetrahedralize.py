@@ -7,7 +7,10 @@ on Graphics 39(4), 2020.
 import contextlib
 import hashlib
 import importlib.metadata
+import json
 import os
+import subprocess
+import sys
 import tempfile
 from numbers import Integral
 from pathlib import Path
@@ -17,11 +20,11 @@ import numpy as np
 from taichifem.errors import InputError
 from taichifem.mesh.surfaces import closed_surface, enclosed_volume
 
-RECIPE = 1  # part of the cache's key: raise it when the way of meshing changes
+RECIPE = 2  # part of the cache's key: raise it when the way of meshing changes
 DEFAULT_EDGE = 0.05  # the library's own: edge length over the diagonal of the bounding box
 ENVELOPE = 0.05  # how far the new surface may stray from the old one, in lengths of an edge
 LONGEST_EDGE = 0.2  # beyond it only the envelope makes meshes coarser, and long edges cost time
-TOLERANCE, TRIES = 0.2, 6
+TOLERANCE, TRIES = 0.25, 5
 
 
 def tetrahedralize(points, triangles, tets: int | None = None) -> tuple[np.ndarray, np.ndarray]:
@@ -65,24 +68,27 @@ def cache_folder() -> Path:
 
 
 def _search(points, triangles, tets: int | None) -> tuple[np.ndarray, np.ndarray]:
-    """Try edge lengths until the count is near the target; the best try wins."""
+    """Try edge lengths until the count is near the target; the best try wins.
+
+    Counts jump from one edge length to the next. Where no plain fill is near the target, coarsened ones are tried,
+    which have fewer tetrahedra inside and jump elsewhere.
+    """
     if tets is None:
         return _fill(points, triangles, DEFAULT_EDGE)
     diagonal = np.linalg.norm(np.ptp(points, axis=0))
-    edge = (6 * 2**0.5 * enclosed_volume(points, triangles) / tets) ** (1 / 3) / diagonal
-    tried: list[tuple[float, int]] = []
-    best = None
-    for _ in range(TRIES):
-        edge = float(np.clip(edge, 1e-3, 1))
-        mesh = _fill(points, triangles, edge)
-        count = len(mesh[1])
-        if best is None or abs(np.log(count / tets)) < abs(np.log(len(best[1]) / tets)):
-            best = mesh
-        if abs(count / tets - 1) < TOLERANCE:
-            break
-        tried.append((edge, count))
-        edge = _next_edge(tried, tets)
-    return best
+    guess = (6 * 2**0.5 * enclosed_volume(points, triangles) / tets) ** (1 / 3) / diagonal
+    fills = []
+    for coarsen in (False, True):
+        edge, tried = guess, []
+        for _ in range(TRIES):
+            edge = float(np.clip(edge, 1e-3, 1))
+            fills.append(_fill(points, triangles, edge, coarsen))
+            count = len(fills[-1][1])
+            if abs(count / tets - 1) < TOLERANCE:
+                return fills[-1]
+            tried.append((edge, count))
+            edge = _next_edge(tried, tets)
+    return min(fills, key=lambda fill: abs(np.log(len(fill[1]) / tets)))
 
 
 def _next_edge(tried: list[tuple[float, int]], tets: int) -> float:
@@ -97,36 +103,37 @@ def _next_edge(tried: list[tuple[float, int]], tets: int) -> float:
     return edge * (count / tets) ** (1 / 1.5)
 
 
-def _fill(points, triangles, edge: float) -> tuple[np.ndarray, np.ndarray]:
-    """One run of fTetWild. `edge` and the envelope are relative to the diagonal of the bounding box."""
-    import pytetwild
+# fTetWild runs in a process of its own: it leaves files in the working folder, prints, and may crash.
+FILL = """
+import json, sys, numpy, pytetwild
+surface = numpy.load("surface.npz")
+points, cells = pytetwild.tetrahedralize(surface["points"], surface["triangles"], **json.loads(sys.argv[1]))
+numpy.savez("filled.npz", points=points, cells=cells)
+"""
 
-    with _silence():
-        filled = pytetwild.tetrahedralize(
-            points,
-            triangles.astype(np.int32),
-            edge_length_fac=min(edge, LONGEST_EDGE),
-            epsilon=min(max(ENVELOPE * edge, 2e-4), 5e-2),
-            num_threads=1,
-            quiet=True,
-            vtk_ordering=True,
-        )
+
+def _fill(points, triangles, edge: float, coarsen: bool = False) -> tuple[np.ndarray, np.ndarray]:
+    """One run of fTetWild. `edge` and the envelope are relative to the diagonal of the bounding box."""
+    options = {
+        "edge_length_fac": min(edge, LONGEST_EDGE),
+        "epsilon": min(max(ENVELOPE * edge, 2e-4), 5e-2),
+        "coarsen": coarsen,
+        "num_threads": 1,
+        "quiet": True,
+        "vtk_ordering": True,
+    }
+    paths = {**os.environ, "PYTHONPATH": os.pathsep.join(path for path in sys.path if path)}
+    with tempfile.TemporaryDirectory(prefix="taichifem-") as folder:
+        np.savez(Path(folder) / "surface.npz", points=points, triangles=triangles.astype(np.int32))
+        command = [sys.executable, "-c", FILL, json.dumps(options)]
+        run = subprocess.run(command, cwd=folder, env=paths, capture_output=True, text=True, errors="replace")
+        filled = _load(Path(folder) / "filled.npz") if run.returncode == 0 else None
+    if filled is None:
+        reason = (run.stderr.strip().splitlines() or [f"exit status {run.returncode}"])[-1]
+        raise InputError(f"the tetrahedraliser failed ({reason[:120]}); simplify or repair the surface")
     if len(filled[1]) == 0:
         raise InputError("the tetrahedraliser found no inside; check that the surface encloses a volume")
-    return np.asarray(filled[0], np.float64), np.asarray(filled[1], np.int32)
-
-
-@contextlib.contextmanager
-def _silence():
-    """Send what C++ code prints to nowhere."""
-    with open(os.devnull, "wb") as nowhere:
-        kept = [os.dup(1), os.dup(2)]
-        try:
-            os.dup2(nowhere.fileno(), 1), os.dup2(nowhere.fileno(), 2)
-            yield
-        finally:
-            os.dup2(kept[0], 1), os.dup2(kept[1], 2)
-            os.close(kept[0]), os.close(kept[1])
+    return filled[0].astype(np.float64), filled[1].astype(np.int32)
 
 
 def _load(entry: Path) -> tuple[np.ndarray, np.ndarray] | None:

@@ -28,6 +28,8 @@ Table = ti.types.ndarray(dtype=ti.f32, ndim=1)
 GROUND = -1
 BACKGROUND = -2
 CAMERA_VIEW, LIGHT_VIEW = 0, 1
+BLOCK = 8
+"""Texels of the shadow map along the side of a block of `nearest_blocks`."""
 
 Look = ti.types.struct(
     eye=vec3,
@@ -35,7 +37,6 @@ Look = ti.types.struct(
     up=vec3,
     forward=vec3,
     focal=ti.f32,  # pixels
-    samples=ti.i32,  # along a pixel's side
     to_light=vec3,
     key=vec3,
     sky=vec3,
@@ -61,7 +62,7 @@ Look = ti.types.struct(
 
 
 @ti.func
-def ray(look: Look, x: ti.f32, y: ti.f32, width: ti.i32, height: ti.i32) -> vec3:
+def ray(look: ti.template(), x: ti.f32, y: ti.f32, width: ti.i32, height: ti.i32) -> vec3:
     """Direction through pixel position (x, y), of depth 1."""
     dx = (x - 0.5 * ti.cast(width, ti.f32)) / look.focal
     dy = (y - 0.5 * ti.cast(height, ti.f32)) / look.focal
@@ -69,7 +70,7 @@ def ray(look: Look, x: ti.f32, y: ti.f32, width: ti.i32, height: ti.i32) -> vec3
 
 
 @ti.func
-def ground_depth(look: Look, direction: vec3) -> ti.f32:
+def ground_depth(look: ti.template(), direction: vec3) -> ti.f32:
     """Depth at which the ray meets the ground from above, or -1."""
     depth = -1.0
     down = direction.dot(look.ground_normal)
@@ -79,33 +80,57 @@ def ground_depth(look: Look, direction: vec3) -> ti.f32:
     return depth
 
 
+@ti.kernel
+def nearest_blocks(keys: Keys, layout: Layout, out: Keys):
+    """The nearest key of each block of the shadow map: most of the floor has nothing above it, and one look
+    at a few blocks tells so."""
+    side, start = layout[LIGHT_VIEW][0], layout[LIGHT_VIEW][2]
+    blocks = side // BLOCK
+    for i in range(blocks * blocks):
+        corner = start + (i // blocks * side + i % blocks) * BLOCK
+        nearest = ti.i64(EMPTY)
+        for y in range(BLOCK):
+            for x in range(BLOCK):
+                nearest = ti.min(nearest, keys[corner + y * side + x])
+        out[i] = nearest
+
+
 @ti.func
-def sunlit(keys: ti.template(), layout: ti.template(), m: mat4, p: vec3, slack: ti.f32) -> ti.f32:
+def sunlit(maps: ti.template(), look: ti.template(), p: vec3, slack: ti.f32) -> ti.f32:
     """Share of the key light that reaches p: a tent-weighted mean over 6 x 6 texels of the shadow map."""
     light = 1.0
-    side, start = layout[LIGHT_VIEW][0], layout[LIGHT_VIEW][2]
+    side, start = maps.layout[LIGHT_VIEW][0], maps.layout[LIGHT_VIEW][2]
+    m = maps.matrices[LIGHT_VIEW]
     q = project(m, p)
-    x = q[0] + 0.5 * ti.cast(side, ti.f32) - 0.5
-    y = q[1] + 0.5 * ti.cast(side, ti.f32) - 0.5
+    x = q[0] + 0.5 * side - 0.5
+    y = q[1] + 0.5 * side - 0.5
     ix = ti.cast(ti.floor(x), ti.i32)
     iy = ti.cast(ti.floor(y), ti.i32)
     if ix >= 2 and iy >= 2 and ix < side - 3 and iy < side - 3:
-        fx = x - ti.cast(ix, ti.f32)
-        fy = y - ti.cast(iy, ti.f32)
         limit = ti.cast(ti.bit_cast(ti.max(q[3] - slack, 0.0), ti.i32), ti.i64) << 32
-        total = 0.0
-        for j in range(-2, 4):
-            row = 0.0
-            for i in ti.static(range(-2, 4)):
-                if keys[start + (iy + j) * side + ix + i] >= limit:
-                    row += ti.max(3.0 - ti.abs(i - fx), 0.0)
-            total += row * ti.max(3.0 - ti.abs(ti.cast(j, ti.f32) - fy), 0.0)
-        light = total / 81.0
+        across = side // BLOCK
+        x0, x1 = (ix - 2) // BLOCK, (ix + 3) // BLOCK
+        y0, y1 = (iy - 2) // BLOCK * across, (iy + 3) // BLOCK * across
+        top = ti.min(maps.blocks[y0 + x0], maps.blocks[y0 + x1])
+        bottom = ti.min(maps.blocks[y1 + x0], maps.blocks[y1 + x1])
+        if ti.min(top, bottom) < limit:
+            fx = x - ti.floor(x)
+            fy = y - ti.floor(y)
+            total = 0.0
+            for j in range(-2, 4):
+                row = 0.0
+                at = start + (iy + j) * side + ix
+                for i in ti.static(range(-2, 4)):
+                    # Tents reach three texels from fx; only the outermost can be past the end.
+                    weight = ti.max(3.0 - ti.abs(i - fx), 0.0)
+                    row += ti.select(maps.keys[at + i] >= limit, weight, 0.0)
+                total += row * ti.max(3.0 - ti.abs(j - fy), 0.0)
+            light = total / 81.0
     return light
 
 
 @ti.func
-def sky_left(occlusion: ti.template(), look: Look, p: vec3) -> ti.f32:
+def sky_left(occlusion: ti.template(), look: ti.template(), p: vec3) -> ti.f32:
     """Share of the sky seen from the ground below p, between the texels of the occlusion grid."""
     side = occlusion.shape[0]
     x = ((p - look.ground).dot(look.ground_u) - look.patch[0]) / look.patch_texel - 0.5
@@ -133,7 +158,7 @@ def line_share(x: ti.f32, footprint: ti.f32, width: ti.f32) -> ti.f32:
 
 
 @ti.func
-def background(look: Look, direction: vec3) -> vec3:
+def background(look: ti.template(), direction: vec3) -> vec3:
     rise = direction.normalized()[2]
     return ti.math.mix(look.horizon, look.zenith, ti.math.smoothstep(-0.1, 0.7, rise))
 
@@ -144,7 +169,7 @@ def ground_light(
     layout: ti.template(),
     shadow: mat4,
     occlusion: ti.template(),
-    look: Look,
+    look: ti.template(),
     direction: vec3,
     beside: vec3,
     below: vec3,
@@ -183,7 +208,7 @@ def surface_light(
     layout: ti.template(),
     shadow: mat4,
     occlusion: ti.template(),
-    look: Look,
+    look: ti.template(),
     p: vec3,
     direction: vec3,
     normal: vec3,

@@ -2,7 +2,7 @@
 
 import numpy as np
 import pytest
-from conftest import random_rotation
+from motions import random_rotation
 
 from taichifem import runtime
 from taichifem.formulas import rotation

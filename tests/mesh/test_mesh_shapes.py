@@ -23,7 +23,7 @@ def enclosed(mesh: TetMesh) -> float:
     return np.einsum("ij,ij->", np.cross(a, b), c) / 6
 
 
-@pytest.mark.parametrize("mesh", ALL.values(), ids=ALL)
+@pytest.mark.parametrize("mesh", list(ALL.values()), ids=list(ALL))
 def test_surface_is_closed_and_faces_outward(mesh):
     triangles = mesh.surface()
     forth = {(a, b) for t in triangles.tolist() for a, b in zip(t, t[1:] + t[:1], strict=True)}
@@ -32,7 +32,7 @@ def test_surface_is_closed_and_faces_outward(mesh):
     assert enclosed(mesh) == pytest.approx(mesh.volume, rel=1e-12)
 
 
-@pytest.mark.parametrize("mesh", ALL.values(), ids=ALL)
+@pytest.mark.parametrize("mesh", list(ALL.values()), ids=list(ALL))
 def test_shapes_are_clean_and_well_shaped(mesh):
     q = quality(mesh)
     assert (q.repairs.flipped, q.repairs.orphans, q.repairs.duplicates, q.pieces) == (0, 0, 0, 1)
@@ -65,14 +65,14 @@ CURVED = {
 }
 
 
-@pytest.mark.parametrize(("shape", "sizes", "exact"), [(s, *c) for s, c in CURVED.items()], ids=CURVED)
+@pytest.mark.parametrize(("shape", "sizes", "exact"), [(s, *c) for s, c in CURVED.items()], ids=list(CURVED))
 def test_curved_volume_converges_with_the_square_of_the_spacing(shape, sizes, exact):
     coarse, fine = (exact - getattr(TetMesh, shape)(**sizes, resolution=n).volume for n in (3, 6))
     assert 0 < fine < 0.03 * exact
     assert coarse / fine == pytest.approx(4, rel=0.15)
 
 
-@pytest.mark.parametrize("shape", CURVED)
+@pytest.mark.parametrize("shape", list(CURVED))
 def test_bodies_of_revolution_are_centred(shape):
     low, high = getattr(TetMesh, shape)().bounds
     assert np.allclose(low + high, 0, atol=0.02)
@@ -81,7 +81,7 @@ def test_bodies_of_revolution_are_centred(shape):
     assert np.allclose(moment, 0, atol=1e-3)
 
 
-@pytest.mark.parametrize("shape", SHAPES)
+@pytest.mark.parametrize("shape", list(SHAPES))
 def test_source_makes_the_same_mesh_again(shape):
     mesh = getattr(TetMesh, shape)()
     again = TetMesh.from_source(mesh.source)

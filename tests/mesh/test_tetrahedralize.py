@@ -88,13 +88,23 @@ def test_a_missing_extra_is_named(ball, monkeypatch):
 
 
 @needs_filler
-def test_a_ball_is_filled_with_about_the_wanted_number(ball, capfd):
+def test_a_ball_is_filled_with_about_the_wanted_number(ball, capfd, tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
     mesh = TetMesh.from_surface(ball.vertices, ball.faces, tets=1000)
     assert 700 < len(mesh.cells) < 1300
     assert mesh.volume == pytest.approx(ball.volume, rel=0.05)
     assert quality(mesh).pieces == 1
     assert mesh.repairs.flipped == 0
     assert capfd.readouterr() == ("", "")
+    assert [file.name for file in tmp_path.iterdir()] == ["cache"]  # the library's own files do not stay
+
+
+@needs_filler
+def test_a_tetrahedraliser_that_crashes_gives_one_line(ball, cache, monkeypatch):
+    monkeypatch.setattr(tetrahedralize, "FILL", "import os; os.abort()")
+    with pytest.raises(InputError, match=r"tetrahedraliser failed .* repair the surface"):
+        TetMesh.from_surface(ball.vertices, ball.faces)
+    assert not cache.exists()
 
 
 @needs_filler
