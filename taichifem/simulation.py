@@ -7,15 +7,17 @@ import os
 import numpy as np
 import scipy.sparse
 
-from taichifem import checkpoint, elements, runtime, surroundings, transfer
-from taichifem.description import Collider, Material, Motion, Scene
+from taichifem import checkpoint, elements, runtime, transfer
+from taichifem.description import Collider, Material, Scene
 from taichifem.description.check import whole
 from taichifem.errors import Diverged, InputError
 from taichifem.integrators import backward_euler
-from taichifem.layout import Group, Layout, lay_out
+from taichifem.integrators.backward_euler import StepReport
+from taichifem.layout import Layout, lay_out
 from taichifem.linear_algebra import assembly, balance
 from taichifem.linear_algebra.pattern import BlockPattern, block_pattern
-from taichifem.stats import Stats
+from taichifem.stats import Stats, figures
+from taichifem.surroundings import Surroundings, pose
 from taichifem.timing import PhaseTimer
 from taichifem.world import Capacity, Counts, World, acquire
 
@@ -43,8 +45,6 @@ class Simulation:
         self.step_count = 0
         self._layout: Layout = lay_out(scene)
         self._pattern: BlockPattern = block_pattern(self._layout.cells, len(self._layout.rest))
-        self._groups: list[Group] = [*self._layout.pins, *self._layout.handles]
-        self._active: list[bool] | None = None
         self._materials = list(self._layout.materials)
         self._options = backward_euler.Options(
             tolerance=scene.tolerance,
@@ -55,7 +55,7 @@ class Simulation:
         self._generation = runtime.generation
         self._world: World = acquire(self._capacity(), precision, self)
         self._timer = PhaseTimer()
-        self._report = backward_euler.StepReport()
+        self._report = StepReport()
         self._stats: Stats | None = None
         self._counts = Counts(
             nodes=len(self._layout.rest),
@@ -66,9 +66,8 @@ class Simulation:
         )
         with self._kernels():
             transfer.fill(self._world, self._layout, self._pattern)
-        self._choose_groups(0.0)
-        self._fill_table()
-        self._move_surroundings(0.0)
+        self._surroundings = Surroundings(self.scene, self._layout, self._world, self._counts)
+        self._surround(0.0)
 
     def _capacity(self) -> Capacity:
         layout, pattern = self._layout, self._pattern
@@ -81,7 +80,7 @@ class Simulation:
             colliders=len(self.scene.colliders),
             held=1 + sum(len(g.nodes) for g in layout.pins),
             pulled=1 + sum(len(g.nodes) for g in layout.handles),
-            poses=len(self._groups),
+            poses=len(layout.pins) + len(layout.handles),
             bodies=len(self.scene.bodies),
         )
 
@@ -99,8 +98,7 @@ class Simulation:
         end = (self.step_count + 1) * dt
         self._timer.reset()
         with self._timer.phase("set-up"):
-            self._choose_groups(end)
-            self._move_surroundings(end)
+            self._surround(end)
         with self._kernels():
             try:
                 self._report = backward_euler.advance(
@@ -137,52 +135,11 @@ class Simulation:
         """Frames completed."""
         return self.step_count // self.scene.substeps
 
-    # What holds and surrounds
-
-    def _choose_groups(self, time: float) -> None:
-        """Tell the world which pins and handles act at `time`, when that has changed."""
-        active = [group.acts_at(time) for group in self._groups]
-        if active == self._active:
-            return
-        self._active = active
-        n_pins = len(self._layout.pins)
-        held, pulled, stiffness = [np.zeros((0, 5))], [np.zeros((0, 2))], [np.zeros(0)]
-        held_bodies = np.zeros(len(self.scene.bodies), dtype=bool)
-        for g, group in enumerate(self._groups):
-            if not active[g]:
-                continue
-            pose = np.full(len(group.nodes), g)
-            if g < n_pins:
-                axes = np.tile(group.axes, (len(group.nodes), 1))
-                held.append(np.column_stack([group.nodes, pose, axes]))
-                held_bodies[self._layout.node_bodies[group.nodes]] = True
-            else:
-                pulled.append(np.column_stack([group.nodes, pose]))
-                stiffness.append(np.full(len(group.nodes), group.stiffness))
-        held, pulled = np.concatenate(held), np.concatenate(pulled)
-        self._counts.held, self._counts.pulled = len(held), len(pulled)
-        self._held_bodies = held_bodies
-        with self._kernels():
-            transfer.fill_groups(self._world, held, pulled, np.concatenate(stiffness))
-        if self.step_count:
-            self._fill_table()
-
-    def _move_surroundings(self, time: float) -> None:
-        """Put poses and colliders where they stand at `time`; what never moves is sent once."""
-        motions: list[Motion | None] = [group.motion for group in self._groups]
-        first = time == 0.0 or self.step_count == 0
-        with self._kernels():
-            if first or any(m is not None for m in motions):
-                transfer.fill_poses(self._world, surroundings.pose_table(motions, time))
-            if first or any(c.motion is not None for c in self.scene.colliders):
-                table = surroundings.collider_table(self.scene.colliders, time, self.scene.dt)
-                transfer.fill_colliders(self._world, table)
+    # Surroundings and materials
 
     def collider_poses(self) -> list[tuple[Collider, np.ndarray, np.ndarray]]:
         """Each collider with the rotation R (3,3) and offset c (3,) [m] that move it now: x = R X + c."""
-        return [(c, *surroundings.pose(c.motion, self.time)) for c in self.scene.colliders]
-
-    # Materials
+        return [(c, *pose(c.motion, self.time)) for c in self.scene.colliders]
 
     def _fill_table(self) -> None:
         rows = np.array(
@@ -201,10 +158,18 @@ class Simulation:
         turning = np.zeros(len(self.scene.bodies), dtype=bool)
         for (body, _), row in self._layout.material_of.items():
             turning[body] |= self._materials[row].model != "linear"
-        flies = np.where(self._held_bodies, balance.HELD, np.where(turning, balance.TURNS, balance.LINEAR))
+        held = self._surroundings.held_bodies
+        flies = np.where(held, balance.HELD, np.where(turning, balance.TURNS, balance.LINEAR))
         with self._kernels():
             transfer.fill_table(self._world, rows, self._layout.body_start, flies)
             elements.gather_masses(self._world, self._counts.nodes, self._counts.bodies)
+
+    def _surround(self, time: float) -> None:
+        """Put pins, handles and colliders where they stand at `time` [s]."""
+        with self._kernels():
+            changed = self._surroundings.update(time)
+        if changed:
+            self._fill_table()
 
     def set_material(self, body: int, material: Material, *, region: int | None = None) -> None:
         """Change a body's material (or that of one region of it) from the next step on; nothing recompiles."""
@@ -337,47 +302,30 @@ class Simulation:
         return float(self._read(self._world.energy).sum())
 
     @property
+    def report(self) -> StepReport:
+        """What the last step took: iterations, residual, contact passes. Costs nothing, unlike `stats`."""
+        return self._report
+
+    @property
+    def phases(self) -> dict[str, float]:
+        """Time the last step spent in each phase [ms]. Costs nothing, unlike `stats`."""
+        return dict(self._timer.ms)
+
+    @property
+    def contacts(self) -> int:
+        """Contacts between nodes and colliders after the last step."""
+        if not self._counts.colliders:
+            return 0
+        with self._kernels():
+            state = transfer.read_contacts(self._world, self._counts.colliders, self._counts.nodes)
+        return int((state["touching"] > 0).sum())
+
+    @property
     def stats(self) -> Stats:
         """Figures of the last step: times, iterations, energies, momenta."""
         if self._stats is None:
-            self._stats = self._figures()
+            self._stats = figures(self)
         return self._stats
-
-    def _figures(self) -> Stats:
-        x, v, m = self.positions, self.velocities, self.masses
-        kinetic = 0.5 * float((m[:, None] * v**2).sum())
-        gravity = -float((m[:, None] * x).sum(axis=0) @ np.asarray(self.scene.gravity))
-        elastic = self.elastic_energy()
-        contacts = 0
-        if self._counts.colliders:
-            with self._kernels():
-                state = transfer.read_contacts(self._world, self._counts.colliders, self._counts.nodes)
-            contacts = int((state["touching"] > 0).sum())
-        ms = {name: round(t, 4) for name, t in self._timer.ms.items()}
-        return Stats(
-            time=self.time,
-            frame=self.frame,
-            step=self.step_count,
-            nodes=self._counts.nodes,
-            elements=self._counts.elements,
-            ms=ms,
-            ms_per_step=round(sum(ms.values()), 4),
-            iterations=self._report.iterations,
-            residual=self._report.residual,
-            converged=self._report.converged,
-            contact_passes=self._report.contact_passes,
-            linearisations=self._report.linearisations,
-            contacts=contacts,
-            energy={
-                "kinetic": kinetic,
-                "elastic": elastic,
-                "gravity": gravity,
-                "total": kinetic + elastic + gravity,
-            },
-            momentum=tuple((m[:, None] * v).sum(axis=0).tolist()),
-            angular_momentum=tuple((m[:, None] * np.cross(x, v)).sum(axis=0).tolist()),
-            max_speed=float(np.sqrt((v**2).sum(axis=1).max())),
-        )
 
     # Checkpoints
 
@@ -419,8 +367,6 @@ class Simulation:
                 transfer.write(w, getattr(w, name), arrays[name])
             transfer.write_contacts(w, arrays)
         self.step_count = int(header["step"])
-        self._active = None
-        self._choose_groups(self.time)
-        self._fill_table()
-        self._move_surroundings(self.time)
+        self._surroundings.forget()
+        self._surround(self.time)
         self._stats = None

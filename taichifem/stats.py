@@ -3,6 +3,12 @@
 from __future__ import annotations
 
 from dataclasses import asdict, dataclass, field
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+if TYPE_CHECKING:
+    from taichifem.simulation import Simulation
 
 
 @dataclass(frozen=True)
@@ -43,3 +49,27 @@ class Stats:
             f"{self.ms_per_step:.1f} ms a step, {self.iterations} CG iterations to {self.residual:.1e}{cap}, "
             f"energy {self.energy.get('total', 0.0):.4g} J"
         )
+
+
+def figures(simulation: Simulation) -> Stats:
+    """Figures of a simulation's last step; energies and momenta are worked out here."""
+    x, v, m = simulation.positions, simulation.velocities, simulation.masses[:, None]
+    kinetic = 0.5 * float((m * v**2).sum())
+    elastic = simulation.elastic_energy()
+    gravity = -float((m * x).sum(axis=0) @ np.asarray(simulation.scene.gravity))
+    ms = {name: round(t, 4) for name, t in simulation.phases.items()}
+    return Stats(
+        time=simulation.time,
+        frame=simulation.frame,
+        step=simulation.step_count,
+        nodes=len(x),
+        elements=len(simulation.cells),
+        ms=ms,
+        ms_per_step=round(sum(ms.values()), 4),
+        **asdict(simulation.report),
+        contacts=simulation.contacts,
+        energy={"kinetic": kinetic, "elastic": elastic, "gravity": gravity, "total": kinetic + elastic + gravity},
+        momentum=tuple((m * v).sum(axis=0).tolist()),
+        angular_momentum=tuple((m * np.cross(x, v)).sum(axis=0).tolist()),
+        max_speed=float(np.sqrt((v**2).sum(axis=1).max())),
+    )

@@ -1,4 +1,4 @@
-"""Poses of pins, handles and colliders at a time, as rows for the world's fields."""
+"""Pins, handles and colliders over time: which act, and where they stand, in the world's fields."""
 
 from __future__ import annotations
 
@@ -6,11 +6,67 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from taichifem.description import BoxCollider, Collider, Motion, PlaneCollider, SphereCollider
+from taichifem import transfer
+from taichifem.description import BoxCollider, Collider, Motion, PlaneCollider, Scene, SphereCollider
 from taichifem.description.motion import rotation_matrix
 from taichifem.formulas.collision import BOX, PLANE, SPHERE
+from taichifem.layout import Group, Layout
+from taichifem.world import Counts, World
 
 _STILL = (np.eye(3), np.zeros(3))
+
+
+class Surroundings:
+    """Keeps the world's pins, handles and colliders up to date. held_bodies (bodies,): what some pin holds now."""
+
+    def __init__(self, scene: Scene, layout: Layout, world: World, counts: Counts) -> None:
+        self.held_bodies = np.zeros(len(scene.bodies), dtype=bool)
+        self._scene, self._layout, self._world, self._counts = scene, layout, world, counts
+        self._groups: list[Group] = [*layout.pins, *layout.handles]
+        self.forget()
+
+    def forget(self) -> None:
+        """Send everything again at the next update, as after loading a state."""
+        self._active: list[bool] | None = None
+
+    def update(self, time: float) -> bool:
+        """Put everything where it stands at `time` [s]; True if pins or handles began or ceased to act.
+
+        What never moves is sent once.
+        """
+        everything = self._active is None
+        motions = [group.motion for group in self._groups]
+        if everything or any(m is not None for m in motions):
+            transfer.fill_poses(self._world, pose_table(motions, time))
+        if everything or any(c.motion is not None for c in self._scene.colliders):
+            table = collider_table(self._scene.colliders, time, self._scene.dt)
+            transfer.fill_colliders(self._world, table)
+        active = [group.acts_at(time) for group in self._groups]
+        if active == self._active:
+            return False
+        self._active = active
+        self._choose(active)
+        return True
+
+    def _choose(self, active: list[bool]) -> None:
+        """Tell the world which nodes are held and pulled."""
+        n_pins = len(self._layout.pins)
+        held, pulled, stiffness = [np.zeros((0, 5))], [np.zeros((0, 2))], [np.zeros(0)]
+        self.held_bodies[:] = False
+        for g, group in enumerate(self._groups):
+            if not active[g]:
+                continue
+            which = np.full(len(group.nodes), g)
+            if g < n_pins:
+                axes = np.tile(group.axes, (len(group.nodes), 1))
+                held.append(np.column_stack([group.nodes, which, axes]))
+                self.held_bodies[self._layout.node_bodies[group.nodes]] = True
+            else:
+                pulled.append(np.column_stack([group.nodes, which]))
+                stiffness.append(np.full(len(group.nodes), group.stiffness))
+        nodes, springs = np.concatenate(held), np.concatenate(pulled)
+        self._counts.held, self._counts.pulled = len(nodes), len(springs)
+        transfer.fill_groups(self._world, nodes, springs, np.concatenate(stiffness))
 
 
 def pose(motion: Motion | None, time: float) -> tuple[np.ndarray, np.ndarray]:

@@ -87,9 +87,9 @@ def _steps(simulation, tip, bar: Bar) -> dict:
     while len(steps) < bar.steps and (not steps or time.perf_counter() < end):
         steps.append(_timed_step(simulation))
         # The timer and the report themselves: `simulation.stats` also computes stresses, which warms caches up.
-        for name, ms in simulation._timer.ms.items():
+        for name, ms in simulation.phases.items():
             phases.setdefault(name, []).append(ms)
-        report = simulation._report
+        report = simulation.report
         iterations.append(report.iterations)
         residuals.append(report.residual)
         capped += not report.converged

@@ -57,13 +57,13 @@ def fill(keys: ti.template(), e: mat3, depths: vec3, triangle: ti.i32, box: ivec
     """Put `triangle` into the pixels of `box` (x0, y0, x1, y1) it covers, where nothing nearer is."""
     width, height, start = view[0], view[1], view[2]
     for y in range(box[1], box[3]):
-        fy = ti.cast(y, ti.f32) + 0.5 - 0.5 * ti.cast(height, ti.f32)
+        fy = y + 0.5 - 0.5 * height
         # Exactly x * slope + rest, never a running sum: the neighbour must find the same number, negated.
         r0 = e[0, 1] * fy + e[0, 2]
         r1 = e[1, 1] * fy + e[1, 2]
         r2 = e[2, 1] * fy + e[2, 2]
         for x in range(box[0], box[2]):
-            fx = ti.cast(x, ti.f32) + 0.5 - 0.5 * ti.cast(width, ti.f32)
+            fx = x + 0.5 - 0.5 * width
             s0 = e[0, 0] * fx + r0
             s1 = e[1, 0] * fx + r1
             s2 = e[2, 0] * fx + r2
@@ -205,23 +205,38 @@ def corner_normals(
 
 
 @ti.kernel
-def ground_occlusion(keys: Keys, layout: Layout, floor: ti.f32, texel: ti.f32, closest: ti.f32, out: Grid):
-    """Share of the sky that what hangs over the ground takes, for each texel of the last view (from below).
+def ground_occlusion(
+    keys: Keys,
+    start: ti.i32,
+    floor: ti.f32,
+    texel: ti.f32,
+    closest: ti.f32,
+    above: Points,
+    out: Grid,
+):
+    """Share of the sky that what hangs over the ground takes, for each texel of the view from below.
 
     Every texel of the underside, at height h and distance r, covers h^2 dA / (pi (h^2 + r^2)^2) of the
-    cosine-weighted sky. floor: depth of the ground in that view;  closest: least h [m].
+    cosine-weighted sky.
+    start: of that view in the keys.  floor: depth of the ground in it.  closest: least h [m].
+    above: scratch (texels,3), for the texels that hold something.
     """
     side = out.shape[0]
-    start = layout[layout.shape[0] - 1][2]
-    for i, j in out:
-        covered = 0.0
-        for y, x in ti.ndrange(side, side):
-            key = keys[start + y * side + x]
+    for _ in range(1):
+        found = 0
+        for i in range(side * side):
+            key = keys[start + i]
             if key != ti.i64(EMPTY):
                 depth = ti.bit_cast(ti.cast(key >> 32, ti.i32), ti.f32)
-                h = ti.max(depth - floor, closest)
-                dx = ti.cast(x - j, ti.f32) * texel
-                dy = ti.cast(y - i, ti.f32) * texel
-                d = h * h + dx * dx + dy * dy
-                covered += h * h / (d * d)
+                above[1 + found] = vec3(i % side * texel, i // side * texel, ti.max(depth - floor, closest))
+                found += 1
+        above[0][0] = found
+    for i, j in out:
+        covered = 0.0
+        for k in range(1, 1 + ti.cast(above[0][0], ti.i32)):
+            q = above[k]
+            dx = q[0] - j * texel
+            dy = q[1] - i * texel
+            share = q[2] / (q[2] * q[2] + dx * dx + dy * dy)
+            covered += share * share
         out[i, j] = ti.min(covered * texel * texel / 3.14159265, 1.0)

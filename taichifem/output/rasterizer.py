@@ -120,13 +120,22 @@ class Rasterizer:
         normals = self._normals(mesh)
         occlusion = np.zeros((UNDERSIDE, UNDERSIDE), np.float32)
         if ground.there:
-            raster_kernels.ground_occlusion(keys, layout, ground.depth, ground.texel, 0.8 * ground.texel, occlusion)
-        look = self._look(mesh, frame, viewpoint, ground, texel)
+            raster_kernels.ground_occlusion(
+                keys,
+                int(layout[2, 2]),
+                ground.depth,
+                ground.texel,
+                1.5 * ground.texel,
+                np.empty((1 + UNDERSIDE**2, 3), np.float32),
+                occlusion,
+            )
+        blocks = _scratch.get("blocks", ti.i64, (SHADOW_SIDE // shading_kernels.BLOCK) ** 2)
+        shading_kernels.nearest_blocks(keys, int(layout[1, 2]), SHADOW_SIDE, blocks)
+        look = self._look(frame, viewpoint, ground, matrices, int(layout[1, 2]), texel)
         picture = np.empty((height, width, 3), np.uint8)
         shading_kernels.shade(
             keys,
-            layout,
-            matrices,
+            blocks,
             look,
             mesh.points,
             mesh.triangles,
@@ -135,6 +144,7 @@ class Rasterizer:
             occlusion,
             self._encoding,
             picture,
+            n,
         )
         return picture
 
@@ -161,14 +171,25 @@ class Rasterizer:
         )
         return normals
 
-    def _look(self, mesh: _Mesh, frame: Frame, viewpoint: Viewpoint, ground: _Ground, texel: float) -> object:
+    def _look(
+        self,
+        frame: Frame,
+        viewpoint: Viewpoint,
+        ground: _Ground,
+        matrices: np.ndarray,
+        light_start: int,
+        texel: float,
+    ) -> object:
         return shading_kernels.Look(
             eye=viewpoint.eye,
             right=viewpoint.right,
             up=viewpoint.up,
             forward=viewpoint.forward,
             focal=viewpoint.focal_pixels(self.size[1]),
-            samples=self.samples,
+            camera_view=matrices[0],
+            light_view=matrices[1],
+            light_side=SHADOW_SIDE,
+            light_start=light_start,
             to_light=self._light,
             key=_KEY,
             sky=_SKY,

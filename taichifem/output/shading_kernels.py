@@ -7,11 +7,10 @@ costs only where something ends.
 
 from taichifem.output.colors import ENCODING_SIZE, KNEE
 from taichifem.output.raster_kernels import (
+    EMPTY,
     Corners,
     Grid,
     Keys,
-    Layout,
-    Matrices,
     Points,
     Triangles,
     edge_functions,
@@ -27,7 +26,6 @@ Table = ti.types.ndarray(dtype=ti.f32, ndim=1)
 
 GROUND = -1
 BACKGROUND = -2
-CAMERA_VIEW, LIGHT_VIEW = 0, 1
 BLOCK = 8
 """Texels of the shadow map along the side of a block of `nearest_blocks`."""
 
@@ -37,6 +35,10 @@ Look = ti.types.struct(
     up=vec3,
     forward=vec3,
     focal=ti.f32,  # pixels
+    camera_view=mat4,
+    light_view=mat4,
+    light_side=ti.i32,  # texels
+    light_start=ti.i32,  # where the shadow map starts in the keys
     to_light=vec3,
     key=vec3,
     sky=vec3,
@@ -64,8 +66,8 @@ Look = ti.types.struct(
 @ti.func
 def ray(look: ti.template(), x: ti.f32, y: ti.f32, width: ti.i32, height: ti.i32) -> vec3:
     """Direction through pixel position (x, y), of depth 1."""
-    dx = (x - 0.5 * ti.cast(width, ti.f32)) / look.focal
-    dy = (y - 0.5 * ti.cast(height, ti.f32)) / look.focal
+    dx = (x - 0.5 * width) / look.focal
+    dy = (y - 0.5 * height) / look.focal
     return look.forward + dx * look.right - dy * look.up
 
 
@@ -81,10 +83,11 @@ def ground_depth(look: ti.template(), direction: vec3) -> ti.f32:
 
 
 @ti.kernel
-def nearest_blocks(keys: Keys, layout: Layout, out: Keys):
-    """The nearest key of each block of the shadow map: most of the floor has nothing above it, and one look
-    at a few blocks tells so."""
-    side, start = layout[LIGHT_VIEW][0], layout[LIGHT_VIEW][2]
+def nearest_blocks(keys: Keys, start: ti.i32, side: ti.i32, out: Keys):
+    """The nearest key (side/BLOCK)^2 in each block of the shadow map.
+
+    Most of the floor has nothing above it, and a look at a few blocks tells so.
+    """
     blocks = side // BLOCK
     for i in range(blocks * blocks):
         corner = start + (i // blocks * side + i % blocks) * BLOCK
@@ -96,12 +99,11 @@ def nearest_blocks(keys: Keys, layout: Layout, out: Keys):
 
 
 @ti.func
-def sunlit(maps: ti.template(), look: ti.template(), p: vec3, slack: ti.f32) -> ti.f32:
+def sunlit(keys: ti.template(), blocks: ti.template(), look: ti.template(), p: vec3, slack: ti.f32) -> ti.f32:
     """Share of the key light that reaches p: a tent-weighted mean over 6 x 6 texels of the shadow map."""
     light = 1.0
-    side, start = maps.layout[LIGHT_VIEW][0], maps.layout[LIGHT_VIEW][2]
-    m = maps.matrices[LIGHT_VIEW]
-    q = project(m, p)
+    side, start = look.light_side, look.light_start
+    q = project(look.light_view, p)
     x = q[0] + 0.5 * side - 0.5
     y = q[1] + 0.5 * side - 0.5
     ix = ti.cast(ti.floor(x), ti.i32)
@@ -111,8 +113,8 @@ def sunlit(maps: ti.template(), look: ti.template(), p: vec3, slack: ti.f32) -> 
         across = side // BLOCK
         x0, x1 = (ix - 2) // BLOCK, (ix + 3) // BLOCK
         y0, y1 = (iy - 2) // BLOCK * across, (iy + 3) // BLOCK * across
-        top = ti.min(maps.blocks[y0 + x0], maps.blocks[y0 + x1])
-        bottom = ti.min(maps.blocks[y1 + x0], maps.blocks[y1 + x1])
+        top = ti.min(blocks[y0 + x0], blocks[y0 + x1])
+        bottom = ti.min(blocks[y1 + x0], blocks[y1 + x1])
         if ti.min(top, bottom) < limit:
             fx = x - ti.floor(x)
             fy = y - ti.floor(y)
@@ -123,7 +125,7 @@ def sunlit(maps: ti.template(), look: ti.template(), p: vec3, slack: ti.f32) -> 
                 for i in ti.static(range(-2, 4)):
                     # Tents reach three texels from fx; only the outermost can be past the end.
                     weight = ti.max(3.0 - ti.abs(i - fx), 0.0)
-                    row += ti.select(maps.keys[at + i] >= limit, weight, 0.0)
+                    row += ti.select(keys[at + i] >= limit, weight, 0.0)
                 total += row * ti.max(3.0 - ti.abs(j - fy), 0.0)
             light = total / 81.0
     return light
@@ -139,8 +141,8 @@ def sky_left(occlusion: ti.template(), look: ti.template(), p: vec3) -> ti.f32:
     ix = ti.cast(ti.floor(x), ti.i32)
     iy = ti.cast(ti.floor(y), ti.i32)
     if look.has_ground == 1 and ix >= 0 and iy >= 0 and ix < side - 1 and iy < side - 1:
-        fx = x - ti.cast(ix, ti.f32)
-        fy = y - ti.cast(iy, ti.f32)
+        fx = x - ix
+        fy = y - iy
         top = occlusion[iy, ix] * (1 - fx) + occlusion[iy, ix + 1] * fx
         bottom = occlusion[iy + 1, ix] * (1 - fx) + occlusion[iy + 1, ix + 1] * fx
         left = 1 - (top * (1 - fy) + bottom * fy)
@@ -166,8 +168,7 @@ def background(look: ti.template(), direction: vec3) -> vec3:
 @ti.func
 def ground_light(
     keys: ti.template(),
-    layout: ti.template(),
-    shadow: mat4,
+    blocks: ti.template(),
     occlusion: ti.template(),
     look: ti.template(),
     direction: vec3,
@@ -196,7 +197,7 @@ def ground_light(
         )
         albedo = ti.math.mix(look.floor_color, look.line_color, lines)
         facing = ti.max(look.ground_normal.dot(look.to_light), 0.0)
-        sun = sunlit(keys, layout, shadow, p, 0.5 * look.shadow_texel)
+        sun = sunlit(keys, blocks, look, p, 0.5 * look.shadow_texel)
         lit = albedo * (facing * sun * look.key + sky_left(occlusion, look, p) * look.sky)
         light = ti.math.mix(lit, light, ti.math.smoothstep(0.25, 1.0, away))
     return light
@@ -205,8 +206,7 @@ def ground_light(
 @ti.func
 def surface_light(
     keys: ti.template(),
-    layout: ti.template(),
-    shadow: mat4,
+    blocks: ti.template(),
     occlusion: ti.template(),
     look: ti.template(),
     p: vec3,
@@ -222,7 +222,7 @@ def surface_light(
     if facing > 0:
         # Stepping off along the normal, the more the flatter the light, keeps a surface out of its own shadow.
         off = look.shadow_texel * (1.5 + 4.0 * (1 - facing))
-        sun = sunlit(keys, layout, shadow, p + off * n, look.shadow_texel)
+        sun = sunlit(keys, blocks, look, p + off * n, look.shadow_texel)
     facing = ti.max(facing, 0.0)
     up = 0.5 + 0.5 * n[2]
     left = sky_left(occlusion, look, p)
@@ -239,11 +239,60 @@ def surface_light(
     return diffuse + 0.16 * shine * sun * look.key + 0.12 * rim * look.sky * up
 
 
+@ti.func
+def triangle_light(
+    keys: ti.template(),
+    blocks: ti.template(),
+    occlusion: ti.template(),
+    look: ti.template(),
+    points: ti.template(),
+    triangles: ti.template(),
+    normals: ti.template(),
+    colors: ti.template(),
+    thing: ti.i32,
+    at: vec3,
+    direction: vec3,
+    samples: ti.template(),
+) -> vec3:
+    """Light from triangle number `thing` at `at` (x, y, 1): samples from the middle of the picture."""
+    corner = triangles[thing]
+    a = points[corner[0]]
+    b = points[corner[1]]
+    c = points[corner[2]]
+    view = look.camera_view
+    e = edge_functions(project(view, a), project(view, b), project(view, c))
+    across = e @ at
+    weight = ti.max(across, 0.0)
+    weight /= ti.max(weight.sum(), 1e-30)
+    p = weight[0] * a + weight[1] * b + weight[2] * c
+    normal = vec3(0.0)
+    albedo = vec3(0.0)
+    for k in ti.static(range(3)):
+        normal += weight[k] * normals[thing, k]
+        albedo += weight[k] * colors[thing, k]
+    normal /= ti.max(normal.norm(), 1e-30)
+    light = surface_light(keys, blocks, occlusion, look, p, direction, normal, albedo)
+    if thing < look.wired:
+        closest = 1e9
+        for k in ti.static(range(3)):
+            slope = ti.sqrt(e[k, 0] * e[k, 0] + e[k, 1] * e[k, 1])
+            closest = ti.min(closest, across[k] / (samples * ti.max(slope, 1e-30)))
+        light *= 1 - 0.55 * ti.math.clamp(0.5 * look.wire_width + 0.5 - closest, 0.0, 1.0)
+    return light
+
+
+@ti.func
+def grain(x: ti.i32, y: ti.i32) -> ti.f32:
+    """A fixed scatter in [0, 1) over the pixels: rounding with it hides the steps of 8 bits in soft shades."""
+    mixed = ti.cast(x, ti.u32) * ti.u32(0x9E3779B1) + ti.cast(y, ti.u32) * ti.u32(0x85EBCA77)
+    mixed = (mixed ^ (mixed >> 15)) * ti.u32(0x2C1B3C6D)
+    return ti.cast(mixed >> 8, ti.f32) * (1.0 / 16777216.0)
+
+
 @ti.kernel
 def shade(
     keys: Keys,
-    layout: Layout,
-    matrices: Matrices,
+    blocks: Keys,
     look: Look,
     points: Points,
     triangles: Triangles,
@@ -252,86 +301,64 @@ def shade(
     occlusion: Grid,
     encoding: Table,
     out: Pixels,
+    samples: ti.template(),
 ):
     """Picture (height,width,3) from the keys of the camera's view (samples^2 a pixel)."""
     height, width = out.shape[0], out.shape[1]
-    n = look.samples
     for py, px in ti.ndrange(height, width):
-        camera = matrices[CAMERA_VIEW]
-        shadow = matrices[LIGHT_VIEW]
-        scale = 1.0 / ti.cast(n, ti.f32)
-        seen = ti.Vector([BACKGROUND, BACKGROUND, BACKGROUND, BACKGROUND])
-        for s in range(n * n):
-            sx = px * n + s % n
-            sy = py * n + s // n
-            key = keys[layout[CAMERA_VIEW][2] + sy * layout[CAMERA_VIEW][0] + sx]
+        seen = ti.Vector([BACKGROUND] * samples**2)
+        for s in ti.static(range(samples**2)):
+            sx = px * samples + s % samples
+            sy = py * samples + s // samples
+            key = keys[sy * width * samples + sx]
             depth = ti.bit_cast(ti.cast(key >> 32, ti.i32), ti.f32)
-            x = (ti.cast(sx, ti.f32) + 0.5) * scale
-            y = (ti.cast(sy, ti.f32) + 0.5) * scale
-            floor = ground_depth(look, ray(look, x, y, width, height))
+            floor = ground_depth(look, ray(look, (sx + 0.5) / samples, (sy + 0.5) / samples, width, height))
             # Empty keys hold a NaN for depth, before which everything is nearer.
             if floor > 0 and not (depth <= floor):
                 seen[s] = GROUND
             elif depth > 0:
                 seen[s] = ti.cast(key & ti.i64(0x7FFFFFFF), ti.i32)
-        picture = vec3(0.0, 0.0, 0.0)
-        for s in range(n * n):
+        picture = vec3(0.0)
+        for s in range(samples**2):
             thing = seen[s]
-            share = 0
-            x = 0.0
-            y = 0.0
+            share, x, y = 0.0, 0.0, 0.0
             first = True
-            for r in range(n * n):
+            for r in ti.static(range(samples**2)):
                 if seen[r] == thing:
                     first = first and r >= s
-                    share += 1
-                    x += ti.cast(px, ti.f32) + (ti.cast(r % n, ti.f32) + 0.5) * scale
-                    y += ti.cast(py, ti.f32) + (ti.cast(r // n, ti.f32) + 0.5) * scale
+                    share += 1.0
+                    x += (r % samples + 0.5) / samples
+                    y += (r // samples + 0.5) / samples
             if first:
-                x /= ti.cast(share, ti.f32)
-                y /= ti.cast(share, ti.f32)
+                x = px + x / share
+                y = py + y / share
                 direction = ray(look, x, y, width, height)
-                light = vec3(0.0, 0.0, 0.0)
+                light = vec3(0.0)
                 if thing == BACKGROUND:
                     light = background(look, direction)
                 elif thing == GROUND:
                     beside = ray(look, x + 1, y, width, height)
                     below = ray(look, x, y + 1, width, height)
-                    light = ground_light(keys, layout, shadow, occlusion, look, direction, beside, below)
+                    light = ground_light(keys, blocks, occlusion, look, direction, beside, below)
                 else:
-                    corner = triangles[thing]
-                    a = points[corner[0]]
-                    b = points[corner[1]]
-                    c = points[corner[2]]
-                    e = edge_functions(project(camera, a), project(camera, b), project(camera, c))
-                    q = vec3(
-                        (x - 0.5 * ti.cast(width, ti.f32)) * ti.cast(n, ti.f32),
-                        (y - 0.5 * ti.cast(height, ti.f32)) * ti.cast(n, ti.f32),
-                        1.0,
+                    at = vec3((x - 0.5 * width) * samples, (y - 0.5 * height) * samples, 1.0)
+                    light = triangle_light(
+                        keys,
+                        blocks,
+                        occlusion,
+                        look,
+                        points,
+                        triangles,
+                        normals,
+                        colors,
+                        thing,
+                        at,
+                        direction,
+                        samples,
                     )
-                    across = e @ q
-                    weight = ti.max(across, 0.0)
-                    weight /= ti.max(weight.sum(), 1e-30)
-                    p = weight[0] * a + weight[1] * b + weight[2] * c
-                    normal = vec3(0.0, 0.0, 0.0)
-                    albedo = vec3(0.0, 0.0, 0.0)
-                    for k in ti.static(range(3)):
-                        normal += weight[k] * normals[thing, k]
-                        albedo += weight[k] * colors[thing, k]
-                    normal /= ti.max(normal.norm(), 1e-30)
-                    light = surface_light(keys, layout, shadow, occlusion, look, p, direction, normal, albedo)
-                    if thing < look.wired:
-                        closest = 1e9
-                        for k in ti.static(range(3)):
-                            slope = ti.sqrt(e[k, 0] * e[k, 0] + e[k, 1] * e[k, 1])
-                            closest = ti.min(closest, across[k] * scale / ti.max(slope, 1e-30))
-                        line = ti.math.clamp(0.5 * look.wire_width + 0.5 - closest, 0.0, 1.0)
-                        light *= 1 - 0.55 * line
                 # Developed before the mean, or a highlight's edge would look jagged; encoded after it.
                 over = ti.max(light - KNEE, 0.0)
-                level = ti.min(light, KNEE) + over / (1 + over / (1 - KNEE))
-                picture += ti.cast(share, ti.f32) * level
+                picture += share / samples**2 * (ti.min(light, KNEE) + over / (1 + over / (1 - KNEE)))
         for k in ti.static(range(3)):
-            mean = ti.math.clamp(picture[k] * scale * scale, 0.0, 1.0)
-            index = ti.cast(ti.sqrt(mean) * (ENCODING_SIZE - 1) + 0.5, ti.i32)
-            out[py, px, k] = ti.cast(encoding[index] + 0.5, ti.u8)
+            index = ti.cast(ti.sqrt(ti.math.clamp(picture[k], 0.0, 1.0)) * (ENCODING_SIZE - 1) + 0.5, ti.i32)
+            out[py, px, k] = ti.cast(ti.min(encoding[index] + grain(px, py), 255.0), ti.u8)
