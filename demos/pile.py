@@ -9,7 +9,7 @@ def check(frames):
         x = simulation.positions
         assert np.isfinite(x).all()
         assert x[:, 2].min() > -0.02
-        to_ball = np.linalg.norm(x - (-0.7, 0.0, 0.1), axis=1) - 0.4
+        to_ball = np.linalg.norm(x - (-0.95, 0.0, 0.1), axis=1) - 0.4
         assert to_ball.min() > -0.02
     assert simulation.stats.converged
     moving = [
