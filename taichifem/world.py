@@ -132,7 +132,7 @@ class World:
         self.sprung = self._scalar(c.nodes, ti.i32)  # 1 where a spring acts
         self.inverse = self._matrix(c.nodes, 3, 3)
         self.residual, self.direction, self.product = (self._vector(c.nodes, 3) for _ in range(3))
-        self.partial = self._vector(CHUNKS, 5, ti.f64)
+        self.partial = self._vector(CHUNKS, 7, ti.f64)
         self.scalar = self._scalar(16, ti.f64)
 
     def _place_surroundings(self) -> None:

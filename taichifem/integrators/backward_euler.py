@@ -141,6 +141,7 @@ def _solve_with_contact(
                 tolerance=options.tolerance,
                 max_iterations=options.max_iterations,
                 noise=noise,
+                weight=weight * dt,
                 drag_factor=dt,
             )
         report.iterations += done.iterations

@@ -1,10 +1,13 @@
 """Conjugate gradients with a block-Jacobi preconditioner, on (A + springs) dv = load + spring_load.
 
 Axes that are held keep the dv they start with: their residual is masked out, and the preconditioner is zero
-there, so no search direction ever moves them. The residual is measured against the impulses that act on the nodes:
-the load and what the springs give at the current dv (`spring_load` alone is far larger where a stiff body hits an
-obstacle, and far from balanced where a body rests). Scalars stay on the device in double precision; sums add fixed
-chunks in order, so that runs repeat bit for bit.
+there, so no search direction ever moves them.
+
+The residual is measured against the smaller of two sizes: the impulses that act on the nodes (load, and what springs
+give at the current dv), which vanish where a body rests; and the change of momentum and weight, which stay sensible
+where a stiff body releases large elastic forces.
+
+Scalars stay on the device in double precision; sums add fixed chunks in order, so that runs repeat bit for bit.
 """
 
 import math
@@ -15,7 +18,7 @@ from taichifem.linear_algebra import balance, matrix
 from taichifem.runtime import ti
 from taichifem.world import CHUNKS, Counts, World
 
-RZ, RESIDUAL, DONE, COUNT, ALPHA, BETA, LOAD, NOISE, SIZE = range(9)
+RZ, RESIDUAL, DONE, COUNT, ALPHA, BETA, LOAD, NOISE, WEIGHT, SIZE = range(10)
 CHECK_EVERY = 8
 
 
@@ -23,7 +26,7 @@ CHECK_EVERY = 8
 class Convergence:
     """What a solve did: iterations, relative residual reached, whether that met the tolerance.
 
-    load: norm of the impulses that act [N s].  noise: what rounding of the forces adds to it.
+    load: what the residual was measured against [N s].  noise: what rounding of the forces adds to it.
     """
 
     iterations: int
@@ -64,25 +67,35 @@ def _impulse(w: ti.template(), i: ti.i32):
 
 
 @ti.func
-def _judge(w: ti.template(), residual, sprung, tolerance):
-    """Relative residual, and whether it will do; `sprung` is the squared impulse on nodes with springs."""
-    size = ti.max(w.scalar[LOAD] ** 2 + sprung, w.scalar[NOISE] ** 2)
-    w.scalar[SIZE] = ti.sqrt(size)
-    w.scalar[RESIDUAL] = ti.sqrt(residual / ti.max(size, 1e-300))
-    if residual <= tolerance * tolerance * size:
+def _change(w: ti.template(), i: ti.i32):
+    """Squared norm of the momentum that dv gives node i."""
+    return ti.cast((w.free[i] * w.mass[i] * w.dv[i]).norm_sqr(), ti.f64)
+
+
+@ti.func
+def _judge(w: ti.template(), residual, sprung, change, tolerance):
+    """Relative residual, and whether it will do.
+
+    `sprung` is the squared impulse on nodes with springs, `change` the squared change of momentum.
+    """
+    impulse = ti.sqrt(w.scalar[LOAD] ** 2 + sprung)
+    size = ti.max(ti.min(impulse, ti.sqrt(change) + w.scalar[WEIGHT]), w.scalar[NOISE])
+    w.scalar[SIZE] = size
+    w.scalar[RESIDUAL] = ti.sqrt(residual) / ti.max(size, 1e-150)
+    if ti.sqrt(residual) <= tolerance * size:
         w.scalar[DONE] = 1.0
 
 
 @ti.kernel
-def _begin(w: ti.template(), n: ti.i32, tolerance: ti.f64, noise: ti.f64):
-    """Preconditioner, first direction, and the size of the load.
+def _begin(w: ti.template(), n: ti.i32, tolerance: ti.f64, noise: ti.f64, weight: ti.f64):
+    """Preconditioner, first direction, and the size of load and weight (`weight` is gravity times dt).
 
     `noise` times the diagonal's size is what rounding leaves of the forces: a right-hand side below that
     is not worth resolving further.
     """
     ti.loop_config(block_dim=1)
     for c in range(CHUNKS):
-        sums = ti.Vector.zero(ti.f64, 5)
+        sums = ti.Vector.zero(ti.f64, 7)
         for i in range(c * n // CHUNKS, (c + 1) * n // CHUNKS):
             r = w.residual[i]
             w.inverse[i] = _inverse_diagonal(w, i)
@@ -97,20 +110,23 @@ def _begin(w: ti.template(), n: ti.i32, tolerance: ti.f64, noise: ti.f64):
                     _impulse(w, i) * (1 - w.sprung[i]),
                     floor**2,
                     _impulse(w, i) * w.sprung[i],
+                    _change(w, i),
+                    ti.cast(w.mass[i] * w.mass[i] * w.free[i].sum() / 3, ti.f64) * weight * weight,
                 ]
             )
         w.partial[c] = sums
     ti.loop_config(serialize=True)
     for _ in range(1):
-        sums = ti.Vector.zero(ti.f64, 5)
+        sums = ti.Vector.zero(ti.f64, 7)
         for c in range(CHUNKS):
             sums += w.partial[c]
         w.scalar[RZ] = sums[0]
         w.scalar[LOAD] = ti.sqrt(sums[2])
         w.scalar[NOISE] = ti.sqrt(sums[3])
+        w.scalar[WEIGHT] = ti.sqrt(sums[6])
         w.scalar[DONE] = 0.0
         w.scalar[COUNT] = 0.0
-        _judge(w, sums[1], sums[4], tolerance)
+        _judge(w, sums[1], sums[4], sums[5], tolerance)
 
 
 @ti.kernel
@@ -135,7 +151,7 @@ def _iterate(w: ti.template(), n: ti.i32, tolerance: ti.f64):
     for c in range(CHUNKS):
         if w.scalar[DONE] == 0:
             alpha = ti.cast(w.scalar[ALPHA], w.real)
-            sums = ti.Vector.zero(ti.f64, 3)
+            sums = ti.Vector.zero(ti.f64, 4)
             for i in range(c * n // CHUNKS, (c + 1) * n // CHUNKS):
                 w.dv[i] += alpha * w.direction[i]
                 r = w.residual[i] - alpha * w.product[i]
@@ -144,18 +160,19 @@ def _iterate(w: ti.template(), n: ti.i32, tolerance: ti.f64):
                 sums[1] += ti.cast(r.dot(r), ti.f64)
                 if w.sprung[i]:
                     sums[2] += _impulse(w, i)
-            for k in ti.static(range(3)):
+                sums[3] += _change(w, i)
+            for k in ti.static(range(4)):
                 w.partial[c][k] = sums[k]
     ti.loop_config(serialize=True)
     for _ in range(1):
         if w.scalar[DONE] == 0:
-            sums = ti.Vector.zero(ti.f64, 5)
+            sums = ti.Vector.zero(ti.f64, 7)
             for c in range(CHUNKS):
                 sums += w.partial[c]
             w.scalar[BETA] = sums[0] / w.scalar[RZ] if w.scalar[RZ] > 0 else 0.0
             w.scalar[RZ] = sums[0]
             w.scalar[COUNT] += 1
-            _judge(w, sums[1], sums[2], tolerance)
+            _judge(w, sums[1], sums[2], sums[3], tolerance)
             # alpha is zero only when rounding has taken the curvature: more iterations cannot help.
             if w.scalar[ALPHA] == 0:
                 w.scalar[DONE] = 1.0
@@ -165,18 +182,25 @@ def _iterate(w: ti.template(), n: ti.i32, tolerance: ti.f64):
 
 
 def solve(
-    w: World, counts: Counts, *, tolerance: float, max_iterations: int, noise: float, drag_factor: float
+    w: World,
+    counts: Counts,
+    *,
+    tolerance: float,
+    max_iterations: int,
+    noise: float,
+    weight: float,
+    drag_factor: float,
 ) -> Convergence:
-    """Improve `w.dv` until the residual is below `tolerance` times the impulses that act.
+    """Improve `w.dv` until the residual is below `tolerance` times what acts on the nodes.
 
     w: world with block, spring, load, spring_load, free and the start dv.  noise: relative rounding error of the
-    forces, over dt.  drag_factor: of `w.drag` in the matrix.
+    forces, over dt.  weight: gravity times dt [m/s].  drag_factor: of `w.drag` in the matrix.
     Raises Diverged where the residual is not finite.
     """
     n = counts.nodes
     _residual(w, n)
     balance.translate(w, counts.bodies, drag_factor)
-    _begin(w, n, tolerance, noise)
+    _begin(w, n, tolerance, noise, weight)
     launched = 0
     while w.scalar[DONE] == 0 and launched < max_iterations and math.isfinite(w.scalar[RESIDUAL]):
         for _ in range(min(CHECK_EVERY, max_iterations - launched)):
