@@ -12,7 +12,5 @@ def check(frames):
         to_ball = np.linalg.norm(x - (-0.95, 0.0, 0.1), axis=1) - 0.4
         assert to_ball.min() > -0.02
     assert simulation.stats.converged
-    moving = [
-        np.linalg.norm(simulation.velocities[simulation.node_bodies == body].mean(axis=0)) for body in range(9)
-    ]
+    moving = [np.linalg.norm(simulation.velocities[simulation.node_bodies == body].mean(axis=0)) for body in range(9)]
     assert np.median(moving) < 0.05

@@ -1,14 +1,17 @@
-"""Loops over elements: rotations, elastic forces, stress and energy; and the sums at the nodes."""
+"""Loops over linear and corotational elements: rotations, forces, stress, energy; and the sums at the nodes."""
 
 from taichifem.formulas import hooke, rotation
 from taichifem.runtime import ti
 
-LAMBDA, MU, MASS_DAMPING, STIFFNESS_DAMPING, DENSITY, TURNS = range(6)
+LAMBDA, MU, MASS_DAMPING, STIFFNESS_DAMPING, DENSITY, MODEL = range(6)
 """Columns of the material table."""
+
+LINEAR, COROTATIONAL, FIRST_LAW = 0, 1, 2
+"""What MODEL may be: the two with the fast road below, or from 2 on the isotropic laws of the scene."""
 
 
 @ti.func
-def _edges(field: ti.template(), w: ti.template(), e: ti.i32):
+def edges(field: ti.template(), w: ti.template(), e: ti.i32):
     """Differences of a node field to the element's first node, as columns (3,3)."""
     cell = w.cell[e]
     first = field[cell[0]]
@@ -37,10 +40,10 @@ def _strain(F, R, w: ti.template(), e: ti.i32):
 
 
 @ti.func
-def _rotation(w: ti.template(), e: ti.i32, F, most: ti.i32, keep: ti.i32):
+def rotation_of(w: ti.template(), e: ti.i32, F, most: ti.i32, keep: ti.i32):
     """Rotation of element e, found from its last one, which it replaces if `keep`; the identity if linear."""
     R = ti.Matrix.identity(w.real, 3)
-    if w.table[w.material[e]][TURNS] > 0:
+    if w.table[w.material[e]][MODEL] > LINEAR:
         q = rotation.nearest_rotation(F, w.rotation[e], ti.cast(ti.static(_tolerance(w.precision)), w.real), most)
         if keep:
             w.rotation[e] = q
@@ -51,6 +54,30 @@ def _rotation(w: ti.template(), e: ti.i32, F, most: ti.i32, keep: ti.i32):
 def _tolerance(precision: str) -> float:
     """Turn [rad] below which a rotation counts as found: Newton's next error is about its square."""
     return {"f32": 2e-4, "f64": 1e-8}[precision]
+
+
+@ti.func
+def gradient(w: ti.template(), e: ti.i32, a: ti.i32):
+    """Shape gradient g_a of corner a (3,) [1/m]."""
+    D = w.gradients[e]
+    g = -ti.Vector([D[0, k] + D[1, k] + D[2, k] for k in ti.static(range(3))])
+    for b in ti.static(range(3)):
+        if a == b + 1:
+            g = ti.Vector([D[b, k] for k in ti.static(range(3))])
+    return g
+
+
+@ti.func
+def with_first(rows):
+    """The rows 1..3 of a quantity of the corners, and before them row 0: minus their sum (4,3)."""
+    return ti.Matrix.rows(
+        [
+            ti.Vector([-(rows[0, k] + rows[1, k] + rows[2, k]) for k in ti.static(range(3))]),
+            ti.Vector([rows[0, k] for k in ti.static(range(3))]),
+            ti.Vector([rows[1, k] for k in ti.static(range(3))]),
+            ti.Vector([rows[2, k] for k in ti.static(range(3))]),
+        ]
+    )
 
 
 @ti.kernel
@@ -73,25 +100,18 @@ def deform(
     """
     for e in range(n_elements):
         row = w.table[w.material[e]]
+        if row[MODEL] >= FIRST_LAW:
+            continue
         gradients = w.gradients[e]
-        F = _edges(w.x, w, e) @ gradients
-        R = _rotation(w, e, F, most, keep)
-        rate = _symmetric(R.transpose() @ (_edges(w.v, w, e) @ gradients))
+        F = edges(w.x, w, e) @ gradients
+        R = rotation_of(w, e, F, most, keep)
+        rate = _symmetric(R.transpose() @ (edges(w.v, w, e) @ gradients))
         damping = row[STIFFNESS_DAMPING]
         strain = _strain(F, R, w, e) + (ti.cast(rate_factor, w.real) + ti.cast(rate_damping, w.real) * damping) * rate
         stress = R @ hooke.stress(strain, row[LAMBDA], row[MU])
         volume = w.volume[e]
-        h = gradients @ R.transpose()  # rows h_1..h_3
-        f = -volume * (gradients @ stress.transpose())  # rows f_1..f_3
-        corners, forces = ti.Matrix.zero(w.real, 4, 3), ti.Matrix.zero(w.real, 4, 3)
-        for k in ti.static(range(3)):
-            corners[0, k] = -(h[0, k] + h[1, k] + h[2, k])
-            forces[0, k] = -(f[0, k] + f[1, k] + f[2, k])
-            for a in ti.static(range(3)):
-                corners[a + 1, k] = h[a, k]
-                forces[a + 1, k] = f[a, k]
-        w.h[e] = corners
-        w.corner_force[e] = forces
+        w.h[e] = with_first(gradients @ R.transpose())
+        w.corner_force[e] = with_first(-volume * (gradients @ stress.transpose()))
         factor = ti.cast(stiffness_factor, w.real) + ti.cast(damping_factor, w.real) * damping
         w.moduli[e] = volume * factor * ti.Vector([row[LAMBDA], row[MU]])
 
@@ -123,13 +143,15 @@ def measure(w: ti.template(), n_elements: ti.i32, most: ti.i32):
     """
     for e in range(n_elements):
         row = w.table[w.material[e]]
-        F = _edges(w.x, w, e) @ w.gradients[e]
-        R = _rotation(w, e, F, most, 0)
+        if row[MODEL] >= FIRST_LAW:
+            continue
+        F = edges(w.x, w, e) @ w.gradients[e]
+        R = rotation_of(w, e, F, most, 0)
         strain = _strain(F, R, w, e)
         sigma = hooke.stress(strain, row[LAMBDA], row[MU])
         cauchy = R @ sigma @ R.transpose()
         det = F.determinant()
-        if row[TURNS] > 0 and det > 0:
+        if row[MODEL] > LINEAR and det > 0:
             cauchy = R @ sigma @ F.transpose() / det
         w.stress[e] = cauchy
         w.energy[e] = w.volume[e] * hooke.energy_density(strain, row[LAMBDA], row[MU])
@@ -147,10 +169,7 @@ def gather_masses(w: ti.template(), n: ti.i32, n_bodies: ti.i32):
         for k in range(w.incident_start[i], w.incident_start[i + 1]):
             e, a = w.incident[k] >> 2, w.incident[k] & 3
             row = w.table[w.material[e]]
-            g = -(w.gradients[e].transpose() @ ti.Vector([1.0, 1.0, 1.0]))
-            for b in ti.static(range(3)):
-                if a == b + 1:
-                    g = ti.Vector([w.gradients[e][b, 0], w.gradients[e][b, 1], w.gradients[e][b, 2]])
+            g = gradient(w, e, a)
             share = row[DENSITY] * w.volume[e] / 4
             mass += share
             drag += share * row[MASS_DAMPING]

@@ -13,6 +13,7 @@ from taichifem.description.check import whole
 from taichifem.errors import Diverged, InputError
 from taichifem.integrators import backward_euler
 from taichifem.integrators.backward_euler import StepReport
+from taichifem.laws import Laws
 from taichifem.layout import Layout, lay_out
 from taichifem.linear_algebra import assembly, balance
 from taichifem.linear_algebra.pattern import BlockPattern, block_pattern
@@ -46,6 +47,7 @@ class Simulation:
         self._layout: Layout = lay_out(scene)
         self._pattern: BlockPattern = block_pattern(self._layout.cells, len(self._layout.rest))
         self._materials = list(self._layout.materials)
+        self._laws = Laws(self._materials)
         self._options = backward_euler.Options(
             tolerance=scene.tolerance,
             max_iterations=scene.max_iterations,
@@ -82,6 +84,7 @@ class Simulation:
             pulled=1 + sum(len(g.nodes) for g in layout.handles),
             poses=len(layout.pins) + len(layout.handles),
             bodies=len(self.scene.bodies),
+            tangents=self._laws.stores_tangents,
         )
 
     def _kernels(self):
@@ -104,6 +107,7 @@ class Simulation:
                 self._report = backward_euler.advance(
                     self._world,
                     self._counts,
+                    self._laws,
                     dt=dt,
                     gravity=np.asarray(self.scene.gravity, dtype=float),
                     options=self._options,
@@ -150,7 +154,7 @@ class Simulation:
                     m.mass_damping,
                     m.stiffness_damping,
                     m.density,
-                    float(m.model != "linear"),
+                    float(self._laws.number(m)),
                 ]
                 for m in self._materials
             ]
@@ -172,10 +176,15 @@ class Simulation:
             self._fill_table()
 
     def set_material(self, body: int, material: Material, *, region: int | None = None) -> None:
-        """Change a body's material (or that of one region of it) from the next step on; nothing recompiles."""
+        """Change a body's material (or that of one region of it) from the next step on; nothing recompiles.
+
+        Raises InputError for a region without a material of its own, and for a law that the scene did not have.
+        """
         row = self._layout.material_of.get((whole("body", body, at_least=0), region))
         if row is None:
             raise InputError(f"body {body} has no material for region {region}: name it in Body.materials")
+        if not self._laws.knows(material):
+            raise InputError(f"the scene has no {material.model!r} material yet: make a new simulation for that")
         self._materials[row] = material
         self._fill_table()
 
@@ -257,25 +266,22 @@ class Simulation:
 
     # Mechanics at the current state
 
-    def _deform(self) -> None:
-        """Corner forces and matrix ingredients for K itself, without damping."""
-        elements.deform(self._world, self._counts.elements, 1.0, 0.0, 0.0, 0.0, backward_euler.ROTATION_ITERATIONS, 0)
-
     def elastic_forces(self) -> np.ndarray:
         """Elastic forces on the nodes (n,3) [N] at the current positions, without damping."""
         with self._kernels():
-            self._deform()
+            self._laws.deform(self._world, self._counts, stiffness=1.0)
             elements.gather_forces(self._world, self._counts.nodes)
         return self._read(self._world.force)
 
-    def stiffness(self) -> scipy.sparse.csr_matrix:
+    def stiffness(self, *, projected: bool = False) -> scipy.sparse.csr_matrix:
         """Tangent stiffness K (3n,3n) [N/m] at the current positions, nothing pinned.
 
-        Corotational elements give the warped stiffness R K R^T (Mueller & Gross 2004).
+        projected: make every element's tangent positive semi-definite first, as the implicit step does.
+        Corotational elements give the warped stiffness R K R^T (Mueller & Gross 2004), the others the exact tangent.
         """
         pattern = self._pattern
         with self._kernels():
-            self._deform()
+            self._laws.deform(self._world, self._counts, stiffness=1.0, projected=projected)
             assembly.assemble(self._world, self._counts.pairs, 0.0, 0.0)
             blocks = transfer.read(self._world, self._world.block, pattern.n_blocks).astype(np.float64)
         n = 3 * self._counts.nodes
@@ -283,7 +289,7 @@ class Simulation:
 
     def _measure(self) -> None:
         with self._kernels():
-            elements.measure(self._world, self._counts.elements, backward_euler.ROTATION_ITERATIONS)
+            self._laws.measure(self._world, self._counts)
 
     def cauchy_stress(self) -> np.ndarray:
         """Cauchy stress of each element (m,3,3) [Pa]."""

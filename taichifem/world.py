@@ -36,12 +36,14 @@ class Capacity:
     pulled: int = 1
     poses: int = 1
     bodies: int = 1
+    tangents: bool = False  # do elements store their stiffness blocks? Isotropic laws need it
 
     LEAST = (256, 1024, 4096, 2048, 8, 4, 256, 256, 8, 8)
 
     def rounded(self) -> Capacity:
-        """The capacity class: every entry rounded up to a power of two."""
-        return Capacity(*(round_up(n, k) for n, k in zip(astuple(self), self.LEAST, strict=True)))
+        """The capacity class: every count rounded up to a power of two."""
+        counts = astuple(self)[:-1]
+        return Capacity(*(round_up(n, k) for n, k in zip(counts, self.LEAST, strict=True)), self.tangents)
 
 
 @dataclass
@@ -114,7 +116,11 @@ class World:
         self.moduli = self._vector(m, 2)  # lambda and mu, times the step's factor of K
         self.stress = self._matrix(m, 3, 3)
         self.energy = self._scalar(m)
-        # Material table: lambda, mu [Pa], mass damping [1/s], stiffness damping [s], density, 1 if it turns.
+        # Isotropic laws: F = U diag(stretch) V^T, and the tangent of `formulas.isotropic`.
+        k = m if self.capacity.tangents else 1
+        self.svd_u, self.svd_v, self.tangent_a = (self._matrix(k, 3, 3) for _ in range(3))
+        self.stretch, self.tangent_p, self.tangent_q = (self._vector(k, 3) for _ in range(3))
+        # Material table: lambda, mu [Pa], mass damping [1/s], stiffness damping [s], density, model.
         self.table = self._vector(self.capacity.materials, 6)
 
     def _place_matrix(self) -> None:
@@ -127,6 +133,7 @@ class World:
         self.upper, self.lower = self._scalar(c.pairs, ti.i32), self._scalar(c.pairs, ti.i32)
         self.diagonal = self._scalar(c.nodes, ti.i32)
         self.block = self._matrix(c.blocks, 3, 3)
+        self.tangent = self._matrix(10 * c.elements if c.tangents else 1, 3, 3)
         self.spring = self._matrix(c.nodes, 3, 3)  # dt^2 times contact and handle stiffness, on the diagonal
         self.spring_load = self._vector(c.nodes, 3)
         self.sprung = self._scalar(c.nodes, ti.i32)  # 1 where a spring acts

@@ -6,14 +6,18 @@ from dataclasses import dataclass
 
 from taichifem.description import check
 
-MODELS = ("linear", "corotational")
+MODELS = ("linear", "corotational", "stvk", "neo-hookean", "invertible")
+WRAPPED = ("corotational", "stvk", "neo-hookean")
 
 
 @dataclass(frozen=True, kw_only=True)
 class Material:
     """An isotropic elastic material.
 
-    model: "corotational" (Mueller & Gross 2004) or "linear" (small strain; swells when it turns).
+    model: "corotational" (Mueller & Gross 2004), "linear" (small strain; swells when it turns), "stvk" (St.
+    Venant-Kirchhoff; gives way in compression), "neo-hookean" (stable form of Smith et al. 2018), or "invertible":
+    the law that `wraps` names, continued below the stretch `threshold` so that crushed elements push back (Irving,
+    Teran & Fedkiw 2004).
     youngs: Young's modulus E [Pa], above 0.  poisson: ratio nu, above -1 and below 0.5.
     density: [kg/m^3], above 0.
     mass_damping: Rayleigh alpha [1/s], slows every motion.  stiffness_damping: Rayleigh beta [s], slows
@@ -27,6 +31,8 @@ class Material:
     density: float = 1000.0
     mass_damping: float = 0.0
     stiffness_damping: float = 0.0
+    wraps: str = "stvk"
+    threshold: float = 0.3
 
     def __post_init__(self) -> None:
         check.choice("model", self.model, MODELS)
@@ -34,6 +40,8 @@ class Material:
         check.number("poisson", self.poisson, above=-1, below=0.5)
         check.number("density", self.density, above=0, unit="kg/m^3")
         check.number("mass_damping", self.mass_damping, at_least=0, unit="1/s")
+        check.choice("wraps", self.wraps, WRAPPED)
+        check.number("threshold", self.threshold, above=0, below=1)
         check.number("stiffness_damping", self.stiffness_damping, at_least=0, unit="s")
 
     @property

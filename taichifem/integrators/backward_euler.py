@@ -13,13 +13,13 @@ from dataclasses import dataclass
 import numpy as np
 
 from taichifem import elements
+from taichifem.laws import Laws
 from taichifem.linear_algebra import assembly, pcg
 from taichifem.processes import contact, holding
 from taichifem.runtime import ti
 from taichifem.timing import PhaseTimer
 from taichifem.world import Counts, World
 
-ROTATION_ITERATIONS = 40
 CONTACT_PASSES = 12
 FRICTION_RENEWALS = 2
 
@@ -86,7 +86,7 @@ def _forget(w: ti.template(), n: ti.i32):
 
 
 def advance(
-    w: World, counts: Counts, *, dt: float, gravity: np.ndarray, options: Options, timer: PhaseTimer
+    w: World, counts: Counts, laws: Laws, *, dt: float, gravity: np.ndarray, options: Options, timer: PhaseTimer
 ) -> StepReport:
     """One step of `dt` [s]: new `w.x`, `w.v`. Poses and colliders must stand where the step ends.
 
@@ -99,7 +99,8 @@ def advance(
     first_load = 0.0
     for k in range(options.newton):
         with timer.phase("forces"):
-            elements.deform(w, counts.elements, dt * dt, dt, dt if k == 0 else 0.0, 1.0, ROTATION_ITERATIONS, 1)
+            rate = dt if k == 0 else 0.0
+            laws.deform(w, counts, stiffness=dt * dt, damping=dt, rate=rate, rate_damping=1.0, keep=True)
             _load(w, n, dt, gravity)
             if k > 0:
                 _forget(w, n)

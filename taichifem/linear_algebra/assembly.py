@@ -1,24 +1,41 @@
 """The block matrix A = M + dt^2 K of a step, gathered pair by pair: no atomics, the same bits every time."""
 
+from taichifem import elements, isotropic_elements
 from taichifem.formulas import hooke
 from taichifem.runtime import ti
 
 
+@ti.func
+def _warped(w: ti.template(), e: ti.i32, a: ti.i32, b: ti.i32):
+    """Block of corners a and b of a linear or corotational element."""
+    h = w.h[e]
+    h_a = ti.Vector([h[a, 0], h[a, 1], h[a, 2]])
+    h_b = ti.Vector([h[b, 0], h[b, 1], h[b, 2]])
+    return hooke.stiffness_block(h_a, h_b, w.moduli[e][0], w.moduli[e][1])
+
+
 @ti.kernel
 def assemble(w: ti.template(), n_pairs: ti.i32, mass_factor: ti.f64, drag_factor: ti.f64):
-    """Gather `w.block` from `w.h` and `w.moduli`, with mass_factor * mass + drag_factor * drag on the diagonal.
+    """Gather `w.block` from `w.h` and `w.moduli`, or from `w.tangent` for isotropic laws.
 
-    The elements' V and the step's factor of K are already in `w.moduli`.
+    On the diagonal come mass_factor * mass + drag_factor * drag.
+    The elements' V and the step's factor of K are already in there.
     """
     for p in range(n_pairs):
         block = ti.Matrix.zero(w.real, 3, 3)
         for k in range(w.pair_start[p], w.pair_start[p + 1]):
             entry = w.pair_entry[k]
             e, a, b = entry >> 4, (entry >> 2) & 3, entry & 3
-            h = w.h[e]
-            h_a = ti.Vector([h[a, 0], h[a, 1], h[a, 2]])
-            h_b = ti.Vector([h[b, 0], h[b, 1], h[b, 2]])
-            block += hooke.stiffness_block(h_a, h_b, w.moduli[e][0], w.moduli[e][1])
+            if ti.static(w.capacity.tangents):
+                if w.table[w.material[e]][elements.MODEL] >= elements.FIRST_LAW:
+                    if a <= b:
+                        block += w.tangent[e * 10 + isotropic_elements.corner_pair(a, b)]
+                    else:
+                        block += w.tangent[e * 10 + isotropic_elements.corner_pair(b, a)].transpose()
+                else:
+                    block += _warped(w, e, a, b)
+            else:
+                block += _warped(w, e, a, b)
         i, j = w.upper[p], w.lower[p]
         if i == j:
             node = w.column[i]

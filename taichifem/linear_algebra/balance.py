@@ -47,36 +47,42 @@ def translate(w: ti.template(), n_bodies: ti.i32, drag_factor: ti.f64):
 
 
 @ti.func
-def _spin_direction(w: ti.template(), begin: ti.i32, end: ti.i32, at: ti.template(), drag_factor):
-    """Write to `w.direction` the rigid motion about positions `at` that would balance torque and keep momentum."""
+def _place(w: ti.template(), body: ti.i32, i: ti.i32):
+    """Where node i stands for the spins of its body."""
+    return ti.cast(w.rest[i] if w.body_flies[body] == LINEAR else w.x[i], ti.f64)
+
+
+@ti.func
+def _spin_direction(w: ti.template(), body: ti.i32, drag_factor):
+    """Write to `w.direction` the rigid motion that would balance the torque on a body and keep its momentum."""
+    begin, end = w.body_start[body], w.body_start[body + 1]
     centre = ti.Vector.zero(ti.f64, 3)
     for i in range(begin, end):
-        centre += ti.cast(at[i], ti.f64)
+        centre += _place(w, body, i)
     centre /= end - begin
     torque = ti.Vector.zero(ti.f64, 3)
     a, b, c = ti.Matrix.zero(ti.f64, 3, 3), ti.Matrix.zero(ti.f64, 3, 3), ti.Matrix.zero(ti.f64, 3, 3)
     for i in range(begin, end):
-        r = ti.cast(at[i], ti.f64) - centre
+        r = _place(w, body, i) - centre
         torque += r.cross(ti.cast(w.residual[i], ti.f64))
         inertia = _inertia(w, i, drag_factor)
         arm = -_cross(r)  # velocity of a spin s about the centre: s x r = arm s
         a += inertia
         b += inertia @ arm
         c += arm.transpose() @ inertia @ arm
-    spin = (c - b.transpose() @ a.inverse() @ b).inverse() @ torque
-    shift = -(a.inverse() @ (b @ spin))
+    coupled = a.inverse() @ b
+    spin = (c - b.transpose() @ coupled).inverse() @ torque
+    shift = -(coupled @ spin)
     for i in range(begin, end):
-        w.direction[i] = ti.cast(shift + spin.cross(ti.cast(at[i], ti.f64) - centre), w.real)
+        w.direction[i] = ti.cast(shift + spin.cross(_place(w, body, i) - centre), w.real)
 
 
 @ti.kernel
 def spin(w: ti.template(), n: ti.i32, n_bodies: ti.i32, drag_factor: ti.f64):
     """After `translate`: turn every body that flies as far as makes its residual smallest; spends the residual."""
     for body in range(n_bodies):
-        if w.body_flies[body] == TURNS:
-            _spin_direction(w, w.body_start[body], w.body_start[body + 1], w.x, drag_factor)
-        elif w.body_flies[body] == LINEAR:
-            _spin_direction(w, w.body_start[body], w.body_start[body + 1], w.rest, drag_factor)
+        if w.body_flies[body] != HELD:
+            _spin_direction(w, body, drag_factor)
         else:
             for i in range(w.body_start[body], w.body_start[body + 1]):
                 w.direction[i] = ti.Vector.zero(w.real, 3)

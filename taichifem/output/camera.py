@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
@@ -49,11 +50,6 @@ class Viewpoint:
         """The point looked at (3,) [m]."""
         return self.eye + self.reach * self.forward
 
-    @property
-    def near(self) -> float:
-        """Depth [m] in front of which nothing is drawn."""
-        return 1e-3 * self.reach
-
     def pixel_matrix(self, height: int) -> np.ndarray:
         """Matrix (4,4) taking (x, y, z, 1) to (X, Y, w, depth).
 
@@ -89,7 +85,7 @@ def frame_points(points: np.ndarray, camera: Camera, size: tuple[int, int]) -> V
     if camera.eye is not None:
         eye = np.asarray(camera.eye, float)
         if np.allclose(eye, target):
-            target = target + [0, 0, -size_of_scene]
+            target = target - np.array([0, 0, size_of_scene])
         return Viewpoint.looking(eye, target, camera.fov)
 
     direction = np.array(_THREE_QUARTER) / np.linalg.norm(_THREE_QUARTER)
@@ -117,10 +113,10 @@ class Framing:
         self.size = size
         self._viewpoint: Viewpoint | None = None
 
-    def of(self, points: np.ndarray) -> Viewpoint:
-        """The viewpoint; the first call chooses it from `points` (n,3) [m]."""
+    def of(self, points: Callable[[], np.ndarray]) -> Viewpoint:
+        """The viewpoint; the first call chooses it so that `points()` (n,3) [m] are seen."""
         if self._viewpoint is None:
-            self._viewpoint = frame_points(points, self.camera, self.size)
+            self._viewpoint = frame_points(points(), self.camera, self.size)
         return self._viewpoint
 
     def move(self, camera: Camera) -> None:

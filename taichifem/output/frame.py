@@ -183,7 +183,7 @@ def build_frame(simulation: Any) -> Frame:
 def hud_lines(simulation: Any) -> tuple[str, ...]:
     """What the picture says in words: time, size, cost."""
     stats = simulation.stats.as_dict()
-    cost = sum(stats.get("ms", {}).values())
+    cost = stats.get("ms_per_step") or sum(stats.get("ms", {}).values())
     lines = [
         simulation.scene.name,
         f"t = {simulation.time:.2f} s",

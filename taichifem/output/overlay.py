@@ -104,7 +104,7 @@ def _bar_panel(low: float, high: float, label: str, unit: str, length: int, size
     sprite.paste(Image.fromarray(strip), (pad, top))
     draw = ImageDraw.Draw(sprite)
     for tick, name in zip(ticks, names, strict=True):
-        y = top + int(round((high - tick * factor) / (high - low) * (length - 1)))
+        y = top + round((high - tick * factor) / (high - low) * (length - 1))
         draw.line((pad + bar, y, pad + bar + size // 3, y), fill=(*_INK, 255))
         _write(sprite, pad + bar + int(0.6 * size), y - int(0.62 * size), name, size, 0.85)
     return np.asarray(sprite, np.uint8)

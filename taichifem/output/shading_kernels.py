@@ -6,147 +6,14 @@ costs only where something ends.
 """
 
 from taichifem.output.colors import ENCODING_SIZE, KNEE
-from taichifem.output.raster_kernels import (
-    EMPTY,
-    Corners,
-    Grid,
-    Keys,
-    Points,
-    Triangles,
-    edge_functions,
-    mat4,
-    project,
-    vec3,
-)
+from taichifem.output.light_kernels import Look, Table, background, nearness_of_ground, ray, sky_left, sunlit, vec2
+from taichifem.output.raster_kernels import EMPTY, Corners, Grid, Keys, Points, Triangles, edge_functions, project, vec3
 from taichifem.runtime import ti
 
-vec2 = ti.types.vector(2, ti.f32)
 Pixels = ti.types.ndarray(dtype=ti.u8, ndim=3)
-Table = ti.types.ndarray(dtype=ti.f32, ndim=1)
 
 GROUND = -1
 BACKGROUND = -2
-BLOCK = 8
-"""Texels of the shadow map along the side of a block of `nearest_blocks`."""
-
-Look = ti.types.struct(
-    eye=vec3,
-    right=vec3,
-    up=vec3,
-    forward=vec3,
-    focal=ti.f32,  # pixels
-    camera_view=mat4,
-    light_view=mat4,
-    light_side=ti.i32,  # texels
-    light_start=ti.i32,  # where the shadow map starts in the keys
-    to_light=vec3,
-    key=vec3,
-    sky=vec3,
-    fill=vec3,
-    horizon=vec3,
-    zenith=vec3,
-    has_ground=ti.i32,
-    ground=vec3,
-    ground_u=vec3,
-    ground_v=vec3,
-    ground_normal=vec3,
-    floor_color=vec3,
-    line_color=vec3,
-    spacing=ti.f32,  # of the lines on the ground [m]
-    middle=vec2,  # of the picture's subject on the ground, along u and v [m]
-    fade=ti.f32,  # distance over which the ground goes into the background [m]
-    patch=vec2,  # first corner of the occlusion grid, along u and v [m]
-    patch_texel=ti.f32,  # [m]
-    shadow_texel=ti.f32,  # [m]
-    wired=ti.i32,  # triangles below this number show their edges
-    wire_width=ti.f32,  # pixels
-)
-
-
-@ti.func
-def ray(look: ti.template(), x: ti.f32, y: ti.f32, width: ti.i32, height: ti.i32) -> vec3:
-    """Direction through pixel position (x, y), of depth 1."""
-    dx = (x - 0.5 * width) / look.focal
-    dy = (y - 0.5 * height) / look.focal
-    return look.forward + dx * look.right - dy * look.up
-
-
-@ti.func
-def ground_depth(look: ti.template(), direction: vec3) -> ti.f32:
-    """Depth at which the ray meets the ground from above, or -1."""
-    depth = -1.0
-    down = direction.dot(look.ground_normal)
-    over = (look.ground - look.eye).dot(look.ground_normal)
-    if look.has_ground == 1 and over < 0 and down < 0:
-        depth = over / down
-    return depth
-
-
-@ti.kernel
-def nearest_blocks(keys: Keys, start: ti.i32, side: ti.i32, out: Keys):
-    """The nearest key (side/BLOCK)^2 in each block of the shadow map.
-
-    Most of the floor has nothing above it, and a look at a few blocks tells so.
-    """
-    blocks = side // BLOCK
-    for i in range(blocks * blocks):
-        corner = start + (i // blocks * side + i % blocks) * BLOCK
-        nearest = ti.i64(EMPTY)
-        for y in range(BLOCK):
-            for x in range(BLOCK):
-                nearest = ti.min(nearest, keys[corner + y * side + x])
-        out[i] = nearest
-
-
-@ti.func
-def sunlit(keys: ti.template(), blocks: ti.template(), look: ti.template(), p: vec3, slack: ti.f32) -> ti.f32:
-    """Share of the key light that reaches p: a tent-weighted mean over 6 x 6 texels of the shadow map."""
-    light = 1.0
-    side, start = look.light_side, look.light_start
-    q = project(look.light_view, p)
-    x = q[0] + 0.5 * side - 0.5
-    y = q[1] + 0.5 * side - 0.5
-    ix = ti.cast(ti.floor(x), ti.i32)
-    iy = ti.cast(ti.floor(y), ti.i32)
-    if ix >= 2 and iy >= 2 and ix < side - 3 and iy < side - 3:
-        limit = ti.cast(ti.bit_cast(ti.max(q[3] - slack, 0.0), ti.i32), ti.i64) << 32
-        across = side // BLOCK
-        x0, x1 = (ix - 2) // BLOCK, (ix + 3) // BLOCK
-        y0, y1 = (iy - 2) // BLOCK * across, (iy + 3) // BLOCK * across
-        top = ti.min(blocks[y0 + x0], blocks[y0 + x1])
-        bottom = ti.min(blocks[y1 + x0], blocks[y1 + x1])
-        if ti.min(top, bottom) < limit:
-            fx = x - ti.floor(x)
-            fy = y - ti.floor(y)
-            total = 0.0
-            for j in range(-2, 4):
-                row = 0.0
-                at = start + (iy + j) * side + ix
-                for i in ti.static(range(-2, 4)):
-                    # Tents reach three texels from fx; only the outermost can be past the end.
-                    weight = ti.max(3.0 - ti.abs(i - fx), 0.0)
-                    row += ti.select(keys[at + i] >= limit, weight, 0.0)
-                total += row * ti.max(3.0 - ti.abs(j - fy), 0.0)
-            light = total / 81.0
-    return light
-
-
-@ti.func
-def sky_left(occlusion: ti.template(), look: ti.template(), p: vec3) -> ti.f32:
-    """Share of the sky seen from the ground below p, between the texels of the occlusion grid."""
-    side = occlusion.shape[0]
-    x = ((p - look.ground).dot(look.ground_u) - look.patch[0]) / look.patch_texel - 0.5
-    y = ((p - look.ground).dot(look.ground_v) - look.patch[1]) / look.patch_texel - 0.5
-    left = 1.0
-    ix = ti.cast(ti.floor(x), ti.i32)
-    iy = ti.cast(ti.floor(y), ti.i32)
-    if look.has_ground == 1 and ix >= 0 and iy >= 0 and ix < side - 1 and iy < side - 1:
-        fx = x - ix
-        fy = y - iy
-        top = occlusion[iy, ix] * (1 - fx) + occlusion[iy, ix + 1] * fx
-        bottom = occlusion[iy + 1, ix] * (1 - fx) + occlusion[iy + 1, ix + 1] * fx
-        left = 1 - (top * (1 - fy) + bottom * fy)
-    return left
 
 
 @ti.func
@@ -160,55 +27,49 @@ def line_share(x: ti.f32, footprint: ti.f32, width: ti.f32) -> ti.f32:
 
 
 @ti.func
-def background(look: ti.template(), direction: vec3) -> vec3:
-    rise = direction.normalized()[2]
-    return ti.math.mix(look.horizon, look.zenith, ti.math.smoothstep(-0.1, 0.7, rise))
-
-
-@ti.func
 def ground_light(
-    keys: ti.template(),
-    blocks: ti.template(),
+    shadow: ti.template(),
+    nearest: ti.template(),
     occlusion: ti.template(),
     look: ti.template(),
+    reach: ti.template(),
+    x: ti.f32,
+    y: ti.f32,
     direction: vec3,
-    beside: vec3,
-    below: vec3,
 ) -> vec3:
-    """Light from the ground along `direction`; beside, below: directions one pixel on, for the footprint."""
-    p = look.eye + ground_depth(look, direction) * direction
-    local = vec2((p - look.ground).dot(look.ground_u), (p - look.ground).dot(look.ground_v))
-    away = (local - look.middle).norm() / look.fade
-    light = background(look, direction)
-    # Past the fade the floor is the background: no shadow to look up, no lines to draw.
+    """Light from the ground seen at pixel position (x, y)."""
+    h = look.ground_view
+    depth = 1 / (h[2, 0] * x + h[2, 1] * y + h[2, 2])
+    u = (h[0, 0] * x + h[0, 1] * y + h[0, 2]) * depth
+    v = (h[1, 0] * x + h[1, 1] * y + h[1, 2]) * depth
+    away = (vec2(u, v) - look.middle).norm() / look.fade
+    light = vec3(0.0)
     if away < 1.0:
-        footprint = vec2(0.0, 0.0)
-        for k in ti.static(range(2)):
-            other = beside if k == 0 else below
-            depth = ground_depth(look, other)
-            step = look.eye + ti.select(depth > 0, depth, 1e6) * other - p
-            footprint[0] += ti.abs(step.dot(look.ground_u))
-            footprint[1] += ti.abs(step.dot(look.ground_v))
-        at = local / look.spacing
-        wide = ti.math.clamp(footprint / look.spacing, 1e-5, 1e3)
+        # How far one pixel reaches over the ground: the derivatives of u and v.
+        wide_u = ti.abs(h[0, 0] - u * h[2, 0]) + ti.abs(h[0, 1] - u * h[2, 1])
+        wide_v = ti.abs(h[1, 0] - v * h[2, 0]) + ti.abs(h[1, 1] - v * h[2, 1])
+        scale = depth / look.spacing
         lines = ti.max(
-            line_share(at[0], wide[0], 0.012),
-            line_share(at[1], wide[1], 0.012),
+            line_share(u / look.spacing, ti.math.clamp(wide_u * scale, 1e-5, 1e3), 0.012),
+            line_share(v / look.spacing, ti.math.clamp(wide_v * scale, 1e-5, 1e3), 0.012),
         )
         albedo = ti.math.mix(look.floor_color, look.line_color, lines)
         facing = ti.max(look.ground_normal.dot(look.to_light), 0.0)
-        sun = sunlit(keys, blocks, look, p, 0.5 * look.shadow_texel)
-        lit = albedo * (facing * sun * look.key + sky_left(occlusion, look, p) * look.sky)
-        light = ti.math.mix(lit, light, ti.math.smoothstep(0.25, 1.0, away))
+        sun = sunlit(shadow, nearest, look, reach, look.eye + depth * direction, 0.5 * look.shadow_texel)
+        light = albedo * (facing * sun * look.key + sky_left(occlusion, look, u, v) * look.sky)
+    if away > 0.25:
+        # The floor goes over into the background: no horizon, no end.
+        light = ti.math.mix(light, background(look, direction), ti.math.smoothstep(0.25, 1.0, away))
     return light
 
 
 @ti.func
 def surface_light(
-    keys: ti.template(),
-    blocks: ti.template(),
+    shadow: ti.template(),
+    nearest: ti.template(),
     occlusion: ti.template(),
     look: ti.template(),
+    reach: ti.template(),
     p: vec3,
     direction: vec3,
     normal: vec3,
@@ -222,10 +83,11 @@ def surface_light(
     if facing > 0:
         # Stepping off along the normal, the more the flatter the light, keeps a surface out of its own shadow.
         off = look.shadow_texel * (1.5 + 4.0 * (1 - facing))
-        sun = sunlit(keys, blocks, look, p + off * n, look.shadow_texel)
+        sun = sunlit(shadow, nearest, look, reach, p + off * n, look.shadow_texel)
     facing = ti.max(facing, 0.0)
     up = 0.5 + 0.5 * n[2]
-    left = sky_left(occlusion, look, p)
+    foot = p - look.ground
+    left = sky_left(occlusion, look, foot.dot(look.ground_u), foot.dot(look.ground_v))
     bounce = look.floor_color * (0.35 + 0.65 * left) * left
     ambient = look.sky * ti.math.mix(0.62 * bounce, vec3(1.0, 1.0, 1.0), up)
     half = (look.to_light + view).normalized()
@@ -241,10 +103,11 @@ def surface_light(
 
 @ti.func
 def triangle_light(
-    keys: ti.template(),
-    blocks: ti.template(),
+    shadow: ti.template(),
+    nearest: ti.template(),
     occlusion: ti.template(),
     look: ti.template(),
+    reach: ti.template(),
     points: ti.template(),
     triangles: ti.template(),
     normals: ti.template(),
@@ -271,7 +134,7 @@ def triangle_light(
         normal += weight[k] * normals[thing, k]
         albedo += weight[k] * colors[thing, k]
     normal /= ti.max(normal.norm(), 1e-30)
-    light = surface_light(keys, blocks, occlusion, look, p, direction, normal, albedo)
+    light = surface_light(shadow, nearest, occlusion, look, reach, p, direction, normal, albedo)
     if thing < look.wired:
         closest = 1e9
         for k in ti.static(range(3)):
@@ -292,7 +155,8 @@ def grain(x: ti.i32, y: ti.i32) -> ti.f32:
 @ti.kernel
 def shade(
     keys: Keys,
-    blocks: Keys,
+    shadow: Table,
+    nearest: Table,
     look: Look,
     points: Points,
     triangles: Triangles,
@@ -302,8 +166,12 @@ def shade(
     encoding: Table,
     out: Pixels,
     samples: ti.template(),
+    reach: ti.template(),
 ):
-    """Picture (height,width,3) from the keys of the camera's view (samples^2 a pixel)."""
+    """Picture (height,width,3) from the keys of the camera's view (samples^2 a pixel).
+
+    reach: of the soft edge of shadows, in texels of the shadow map, at most BLOCK/2.
+    """
     height, width = out.shape[0], out.shape[1]
     for py, px in ti.ndrange(height, width):
         seen = ti.Vector([BACKGROUND] * samples**2)
@@ -312,12 +180,11 @@ def shade(
             sy = py * samples + s // samples
             key = keys[sy * width * samples + sx]
             depth = ti.bit_cast(ti.cast(key >> 32, ti.i32), ti.f32)
-            floor = ground_depth(look, ray(look, (sx + 0.5) / samples, (sy + 0.5) / samples, width, height))
-            # Empty keys hold a NaN for depth, before which everything is nearer.
-            if floor > 0 and not (depth <= floor):
-                seen[s] = GROUND
-            elif depth > 0:
+            floor = nearness_of_ground(look, (sx + 0.5) / samples, (sy + 0.5) / samples)
+            if key != ti.i64(EMPTY) and depth * floor <= 1:
                 seen[s] = ti.cast(key & ti.i64(0x7FFFFFFF), ti.i32)
+            elif floor > 0:
+                seen[s] = GROUND
         picture = vec3(0.0)
         for s in range(samples**2):
             thing = seen[s]
@@ -337,16 +204,15 @@ def shade(
                 if thing == BACKGROUND:
                     light = background(look, direction)
                 elif thing == GROUND:
-                    beside = ray(look, x + 1, y, width, height)
-                    below = ray(look, x, y + 1, width, height)
-                    light = ground_light(keys, blocks, occlusion, look, direction, beside, below)
+                    light = ground_light(shadow, nearest, occlusion, look, reach, x, y, direction)
                 else:
                     at = vec3((x - 0.5 * width) * samples, (y - 0.5 * height) * samples, 1.0)
                     light = triangle_light(
-                        keys,
-                        blocks,
+                        shadow,
+                        nearest,
                         occlusion,
                         look,
+                        reach,
                         points,
                         triangles,
                         normals,

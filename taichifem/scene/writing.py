@@ -12,8 +12,8 @@ import numpy as np
 import tomli_w
 
 from taichifem.description import Pin, Scene
-from taichifem.mesh import TetMesh
 from taichifem.files import replacing
+from taichifem.mesh import TetMesh
 from taichifem.scene.layout import COLLIDERS, REGIONS, SIMULATION, keys
 
 _REGION_KEYS = {cls: key for key, cls in REGIONS.items()}

@@ -14,47 +14,62 @@ SAMPLES = {"corotational": "corotated", "stvk": "stvk", "neo-hookean": "stable_n
 LA, MU = 3e5, 1e5
 
 
-def make_kernel(precision: str):
-    """The kernel that evaluates a law: the same body, compiled in one precision."""
+def make_kernels(precision: str):
+    """Kernels in one precision: singular values; a law's answer; the tangents written out. Apart they compile fast."""
     real = runtime.PRECISIONS[precision]
     matrix = ti.types.ndarray(dtype=ti.types.matrix(3, 3, real), ndim=1)
+    vector = ti.types.ndarray(dtype=ti.types.vector(3, real), ndim=1)
     scalar = ti.types.ndarray(dtype=real, ndim=1)
 
     @ti.kernel
-    def run(
+    def decompose(F: matrix, U: matrix, s: vector, V: matrix):
+        for n in F:
+            turn = rotation.nearest_rotation(F[n], ti.Vector([1.0, 0.0, 0.0, 0.0]), 1e-8, 60)
+            U[n], s[n], V[n] = eigen.signed_svd(F[n], rotation.rotation_of(turn))
+
+    @ti.kernel
+    def answer(
         model: ti.template(),
-        F: matrix,
-        la: scalar,
-        mu: scalar,
+        moduli: scalar,
+        U: matrix,
+        s: vector,
+        V: matrix,
         energy: scalar,
         stress: matrix,
         cauchy: matrix,
-        tangents: ti.types.ndarray(dtype=real, ndim=4),
-        block: matrix,
+        A: matrix,
+        p: vector,
+        q: vector,
     ):
-        for n in F:
-            turn = rotation.nearest_rotation(F[n], ti.Vector([1.0, 0.0, 0.0, 0.0]), 1e-8, 60)
-            U, s, V = eigen.signed_svd(F[n], rotation.rotation_of(turn))
-            slope = model.slope(s, la[n], mu[n])
-            energy[n] = model.energy(s, la[n], mu[n])
-            stress[n] = isotropic.first_piola(U, slope, V)
-            cauchy[n] = isotropic.cauchy(U, slope, s)
-            A, p, q = isotropic.tangent(model, s, la[n], mu[n])
-            g_a, g_b = ti.Vector([1.0, 2.0, -3.0]), ti.Vector([-2.0, 0.5, 1.0])
-            block[n] = isotropic.stiffness_block(g_a, g_b, U, V, A, p, q)
-            for projected in range(2):
-                if projected == 1:
-                    A, p, q = isotropic.project(A, p, q)
-                for k in range(9):
-                    dF = ti.Matrix([[1.0 if k == 3 * i + j else 0.0 for j in range(3)] for i in range(3)])
-                    dP = isotropic.stress_change(dF, U, V, A, p, q)
-                    for i, j in ti.static(ti.ndrange(3, 3)):
-                        tangents[n, projected, 3 * i + j, k] = dP[i, j]
+        for n in s:
+            la, mu = moduli[0], moduli[1]
+            slope = model.slope(s[n], la, mu)
+            energy[n] = model.energy(s[n], la, mu)
+            stress[n] = isotropic.first_piola(U[n], slope, V[n])
+            cauchy[n] = isotropic.cauchy(U[n], slope, s[n])
+            A[n], p[n], q[n] = isotropic.tangent(model, s[n], la, mu)
 
-    return run
+    @ti.kernel
+    def project(A: matrix, p: vector, q: vector):
+        for n in A:
+            A[n], p[n], q[n] = isotropic.project(A[n], p[n], q[n])
+
+    @ti.kernel
+    def change(U: matrix, V: matrix, A: matrix, p: vector, q: vector, units: matrix, changes: matrix):
+        for n in A:
+            for k in range(9):
+                changes[9 * n + k] = isotropic.stress_change(units[k], U[n], V[n], A[n], p[n], q[n])
+
+    @ti.kernel
+    def couple(U: matrix, V: matrix, A: matrix, p: vector, q: vector, g: vector, block: matrix):
+        for n in A:
+            block[n] = isotropic.stiffness_block(g[0], g[1], U[n], V[n], A[n], p[n], q[n])
+
+    return decompose, answer, project, change, couple
 
 
-KERNELS = {precision: make_kernel(precision) for precision in runtime.PRECISIONS}
+KERNELS = {precision: make_kernels(precision) for precision in runtime.PRECISIONS}
+SHAPE_GRADIENTS = np.array([[1.0, 2.0, -3.0], [-2.0, 0.5, 1.0]])
 
 
 class Response:
@@ -62,13 +77,29 @@ class Response:
 
     def __init__(self, law: str, F: np.ndarray, la: float = LA, mu: float = MU, precision: str = "f64"):
         runtime.start()
-        n, kind = len(F), np.float32 if precision == "f32" else np.float64
-        F, moduli = np.ascontiguousarray(F, kind), [np.full(n, value, kind) for value in (la, mu)]
-        self.energy, self.stress, self.cauchy = np.zeros(n, kind), np.zeros_like(F), np.zeros_like(F)
-        self.block, tangents = np.zeros_like(F), np.zeros((n, 2, 9, 9), kind)
+        self.kind = np.float32 if precision == "f32" else np.float64
+        self.kernels, n = KERNELS[precision], len(F)
+        F = np.ascontiguousarray(F, self.kind)
+        U, V, A = np.zeros_like(F), np.zeros_like(F), np.zeros_like(F)
+        s, p, q = (np.zeros((n, 3), self.kind) for _ in range(3))
+        self.energy, self.stress, self.cauchy = np.zeros(n, self.kind), np.zeros_like(F), np.zeros_like(F)
+        decompose, answer, project, _, couple = self.kernels
         with runtime.precision_of(precision):
-            KERNELS[precision](LAWS[law], F, *moduli, self.energy, self.stress, self.cauchy, tangents, self.block)
-        self.tangent, self.projected = tangents[:, 0], tangents[:, 1]
+            decompose(F, U, s, V)
+            moduli = np.array([la, mu], self.kind)
+            answer(LAWS[law], moduli, U, s, V, self.energy, self.stress, self.cauchy, A, p, q)
+            self.tangent = self._matrices(U, V, A, p, q)
+            if precision == "f64":
+                self.block = np.zeros_like(F)
+                couple(U, V, A, p, q, SHAPE_GRADIENTS, self.block)
+                project(A, p, q)
+                self.projected = self._matrices(U, V, A, p, q)
+
+    def _matrices(self, U, V, A, p, q):
+        """Tangents (n,9,9), from the changes of stress that unit changes of F make."""
+        changes, units = np.zeros((9 * len(A), 3, 3), self.kind), np.eye(9, dtype=self.kind).reshape(9, 3, 3)
+        self.kernels[3](U, V, A, p, q, units, changes)
+        return changes.reshape(-1, 9, 9).transpose(0, 2, 1)
 
 
 def gradients(n: int = 300, least: float = 0.0) -> np.ndarray:
@@ -123,9 +154,9 @@ def test_stress_and_tangent_are_derivatives(law):
 
 @pytest.mark.parametrize("law", LAWS)
 def test_block_and_cauchy_stress_follow_from_tangent_and_stress(law):
-    F = gradients()
+    F = gradients(least=0.1)
     got = Response(law, F)
-    g_a, g_b = np.array([1, 2, -3]), np.array([-2, 0.5, 1])
+    g_a, g_b = SHAPE_GRADIENTS
     close(got.block, np.einsum("nijkl,j,l->nik", got.tangent.reshape(-1, 3, 3, 3, 3), g_a, g_b), 1e-13)
     J = np.linalg.det(F)[:, None, None]
     close(got.cauchy, got.stress @ F.transpose(0, 2, 1) / J, 1e-9)
@@ -145,7 +176,7 @@ def test_projection(law):
         np.testing.assert_allclose(clamped, np.maximum(own, 0), atol=1e-12 * np.abs(tangent).max())
         if own.min() >= 0:
             np.testing.assert_allclose(projected, tangent, atol=1e-14 * size)
-    assert (np.linalg.eigvalsh(got.tangent)[:, 0] > 0).sum() > 20
+    assert (np.linalg.eigvalsh(got.tangent)[:, 0] > 0).sum() > 10
 
 
 @pytest.mark.parametrize("law", LAWS)
@@ -163,13 +194,41 @@ def test_objective_and_isotropic(law):
 
 @pytest.mark.parametrize("law", LAWS)
 def test_nearly_equal_stretches(law):
-    """The quotients and their limits agree where one takes over from the other, to 1e-10."""
+    """Quotients and limits pass into each other: all lie on one parabola in the gap."""
     rng = np.random.default_rng(9)
     left, right = random_rotation(rng), random_rotation(rng)
-    gaps = np.concatenate([[0], np.logspace(-9, -3, 40)])
+    gaps = np.concatenate([[0], np.logspace(-9, -4, 60)])
     F = np.array([left @ np.diag([0.9, 0.9 + gap, 1.3]) @ right for gap in gaps])
-    tangent = Response(law, F).tangent
-    slope = (tangent[-1] - tangent[0]) / gaps[-1]
-    expected = tangent[0] + gaps[:, None, None] * slope
-    bent = gaps < 3e-5  # beyond, the tangent is no longer a straight line in the gap
-    close(tangent[bent], expected[bent], 1e-7)
+    tangent = Response(law, F).tangent.reshape(len(gaps), -1)
+    powers = np.vander(gaps / gaps[-1], 3)
+    parabola = powers @ np.linalg.lstsq(powers, tangent, rcond=None)[0]
+    close(tangent, parabola, 1e-10)
+
+
+def test_two_dimensions_are_plane_strain():
+    runtime.start()
+    law, flat, n = LAWS["neo-hookean"], ti.types.ndarray(dtype=ti.types.matrix(2, 2, ti.f64), ndim=1), 50
+    rng = np.random.default_rng(10)
+    angles, F = rng.uniform(0, 2 * np.pi, size=n), rng.normal(size=(n, 2, 2))
+    R = np.array([[[c, -s], [s, c]] for c, s in zip(np.cos(angles), np.sin(angles), strict=True)])
+    S = F + F.transpose(0, 2, 1) + 2 * np.eye(2)
+    stress, change, block = np.zeros_like(F), np.zeros_like(F), np.zeros_like(F)
+
+    @ti.kernel
+    def run(F: flat, R: flat, dF: flat, stress: flat, change: flat, block: flat):
+        for k in F:
+            U, s, V = eigen.signed_svd(F[k], R[k])
+            stress[k] = isotropic.first_piola(U, law.slope(s, LA, MU), V)
+            A, p, q = isotropic.tangent(law, s, LA, MU)
+            change[k] = isotropic.stress_change(dF[k], U, V, A, p, q)
+            block[k] = isotropic.stiffness_block(ti.Vector([1.0, 2.0]), ti.Vector([-2.0, 0.5]), U, V, A, p, q)
+
+    with runtime.precision_of("f64"):
+        run(R @ S, R, F, stress, change, block)
+    solid = np.tile(np.eye(3), (n, 1, 1))
+    solid[:, :2, :2] = R @ S
+    expected = Response("neo-hookean", solid)
+    close(stress, expected.stress[:, :2, :2], 1e-11)
+    tangent = expected.tangent.reshape(n, 3, 3, 3, 3)[:, :2, :2, :2, :2]
+    close(change, np.einsum("nijkl,nkl->nij", tangent, F), 1e-10)
+    close(block, np.einsum("nijkl,j,l->nik", tangent, [1, 2], [-2, 0.5]), 1e-10)

@@ -66,7 +66,9 @@ def test_each_function_is_the_derivative_of_the_one_before(law, d):
     direction = direction[: len(s)]
     _, slope, curvature, along = evaluate(law, s, direction)
     plus, minus = evaluate(law, s + h * direction), evaluate(law, s - h * direction)
-    energy_change, slope_change, curvature_change = [(a - b) / (2 * h) for a, b in zip(plus[:3], minus[:3], strict=True)]
+    energy_change, slope_change, curvature_change = [
+        (a - b) / (2 * h) for a, b in zip(plus[:3], minus[:3], strict=True)
+    ]
     np.testing.assert_allclose(energy_change, np.einsum("ni,ni->n", slope, direction), rtol=1e-6, atol=1e-3 * MU * h)
     expected = np.einsum("nij,nj->ni", curvature, direction)
     np.testing.assert_allclose(slope_change, expected, atol=1e-8 * np.abs(expected).max())

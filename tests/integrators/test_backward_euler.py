@@ -35,7 +35,15 @@ def test_linear_history(transient):
     assert np.abs(simulation.positions - data["X"] - final).max() < 1e-8 * np.abs(final).max()
 
 
-@pytest.mark.parametrize(("model", "law"), [("linear", "linear"), ("corotational", "corotated")])
+@pytest.mark.parametrize(
+    ("model", "law"),
+    [
+        ("linear", "linear"),
+        ("corotational", "corotated"),
+        ("stvk", "stvk"),
+        ("neo-hookean", "stable_neohookean"),
+    ],
+)
 def test_nonlinear_history(transient, model, law):
     """Converged backward Euler, 40 steps."""
     _, data = transient

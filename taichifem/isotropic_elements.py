@@ -1,0 +1,95 @@
+"""Loops over the elements of isotropic laws: forces, tangent blocks, stress and energy.
+
+Which law, is settled when a kernel is compiled: one small kernel for each law that a scene uses, between two that all
+laws share. Tangents are projected to positive semi-definite, element by element, so that the matrix of an implicit
+step stays so.
+"""
+
+from taichifem import elements
+from taichifem.formulas import eigen, isotropic
+from taichifem.runtime import ti
+
+CORNERS = 10
+"""Pairs a <= b of an element's corners, and so blocks of its stiffness that are stored."""
+
+
+@ti.func
+def corner_pair(a: ti.i32, b: ti.i32):
+    """Number of the pair a <= b among 00 01 02 03 11 12 13 22 23 33."""
+    return a * 4 + b - a * (a + 1) // 2
+
+
+@ti.kernel
+def decompose(w: ti.template(), n_elements: ti.i32, most: ti.i32, keep: ti.i32):
+    """F = U diag(s) V^T of every element with an isotropic law."""
+    for e in range(n_elements):
+        if w.table[w.material[e]][elements.MODEL] >= elements.FIRST_LAW:
+            F = elements.edges(w.x, w, e) @ w.gradients[e]
+            U, s, V = eigen.signed_svd(F, elements.rotation_of(w, e, F, most, keep))
+            w.svd_u[e] = U
+            w.svd_v[e] = V
+            w.stretch[e] = s
+
+
+@ti.kernel
+def respond(
+    w: ti.template(),
+    law: ti.template(),
+    number: ti.i32,
+    n_elements: ti.i32,
+    rate_factor: ti.f64,
+    rate_damping: ti.f64,
+    projected: ti.i32,
+):
+    """After `decompose`: corner forces, as in `elements.deform`, and the tangent of the elements of law `number`.
+
+    projected: 0 takes the exact tangent, which may be indefinite.
+    """
+    for e in range(n_elements):
+        row = w.table[w.material[e]]
+        if row[elements.MODEL] == number:
+            la, mu = row[elements.LAMBDA], row[elements.MU]
+            U, s, V = w.svd_u[e], w.stretch[e], w.svd_v[e]
+            A, p, q = isotropic.tangent(law, s, la, mu)
+            if projected:
+                A, p, q = isotropic.project(A, p, q)
+            rate = elements.edges(w.v, w, e) @ w.gradients[e]
+            share = ti.cast(rate_factor, w.real) + ti.cast(rate_damping, w.real) * row[elements.STIFFNESS_DAMPING]
+            P = isotropic.first_piola(U, law.slope(s, la, mu), V)
+            P += share * isotropic.stress_change(rate, U, V, A, p, q)
+            w.corner_force[e] = elements.with_first(-w.volume[e] * (w.gradients[e] @ P.transpose()))
+            w.tangent_a[e], w.tangent_p[e], w.tangent_q[e] = A, p, q
+
+
+@ti.kernel
+def store_blocks(w: ti.template(), n_elements: ti.i32, stiffness_factor: ti.f64, damping_factor: ti.f64):
+    """After `respond`: blocks V K_ab, times stiffness_factor + damping_factor beta, in `w.tangent`."""
+    for k in range(n_elements * CORNERS):
+        e = k // CORNERS
+        row = w.table[w.material[e]]
+        if row[elements.MODEL] >= elements.FIRST_LAW:
+            # Pair number back to corners: rows of 4, 3, 2 and 1.
+            left, a = k % CORNERS, 0
+            while left >= 4 - a:
+                left -= 4 - a
+                a += 1
+            b = a + left
+            damping = row[elements.STIFFNESS_DAMPING]
+            factor = ti.cast(stiffness_factor, w.real) + ti.cast(damping_factor, w.real) * damping
+            g_a, g_b = elements.gradient(w, e, a), elements.gradient(w, e, b)
+            block = isotropic.stiffness_block(
+                g_a, g_b, w.svd_u[e], w.svd_v[e], w.tangent_a[e], w.tangent_p[e], w.tangent_q[e]
+            )
+            w.tangent[k] = w.volume[e] * factor * block
+
+
+@ti.kernel
+def measure(w: ti.template(), law: ti.template(), number: ti.i32, n_elements: ti.i32):
+    """After `decompose`: Cauchy stress `w.stress` [Pa] and energy `w.energy` [J] of the elements of law `number`."""
+    for e in range(n_elements):
+        row = w.table[w.material[e]]
+        if row[elements.MODEL] == number:
+            la, mu = row[elements.LAMBDA], row[elements.MU]
+            s = w.stretch[e]
+            w.stress[e] = isotropic.cauchy(w.svd_u[e], law.slope(s, la, mu), s)
+            w.energy[e] = w.volume[e] * law.energy(s, la, mu)
