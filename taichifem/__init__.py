@@ -11,8 +11,8 @@ __version__ = "0.1.0"
 
 _HOME = {
     "taichifem.description": (
-        "Body BoxCollider BoxRegion Camera Handle IndexRegion Material Motion NearestRegion Pin "
-        "PlaneCollider Scene SphereCollider SphereRegion View"
+        "Body BoxCollider BoxRegion Camera Force Handle IndexRegion Material Motion NearestRegion Pin "
+        "PlaneCollider Pressure Scene SphereCollider SphereRegion Traction View"
     ),
     "taichifem.errors": "Diverged InputError",
     "taichifem.mesh": "TetMesh",

@@ -1,21 +1,51 @@
-"""Loops over linear and corotational elements: rotations, forces, stress, energy; and the sums at the nodes."""
+"""Loops over linear and corotational elements: rotations, forces, stress, energy; and the sums at the nodes.
+
+The same code serves tetrahedra (d = 3) and triangles (d = 2: plane strain in the plane y = 0).
+"""
 
 from taichifem.formulas import hooke, rotation
 from taichifem.runtime import ti
 
-LAMBDA, MU, MASS_DAMPING, STIFFNESS_DAMPING, DENSITY, MODEL = range(6)
-"""Columns of the material table."""
+LAMBDA, MU, MASS_DAMPING, STIFFNESS_DAMPING, DENSITY, MODEL, SPRING = range(7)
+"""Columns of the material table. SPRING: stiffness [N/m] given for the springs along edges, or 0."""
 
-LINEAR, COROTATIONAL, FIRST_LAW = 0, 1, 2
-"""What MODEL may be: the two with the fast road below, or from 2 on the isotropic laws of the scene."""
+LINEAR, COROTATIONAL, QUICK, SPRINGS, FIRST_LAW = range(5)
+"""What MODEL may be: up to QUICK (corotational by QR) they have the fast road below; SPRINGS are in
+`spring_elements`; from FIRST_LAW on come the isotropic laws of the scene."""
+
+AXES = {2: (0, 2), 3: (0, 1, 2)}
+"""Coordinates of the nodes that elements of dimension d see."""
+
+
+@ti.func
+def seen(v, w: ti.template()):
+    """The coordinates (d,) of a node vector (3,) that the elements see."""
+    return ti.Vector([v[k] for k in ti.static(AXES[w.d])])
+
+
+@ti.func
+def lifted(f, w: ti.template()):
+    """The node vector (3,) of what an element says (d,): the inverse of `seen`, zero across the plane."""
+    return f if ti.static(w.d == 3) else ti.Vector([f[0], 0.0 * f[0], f[1]])
+
+
+@ti.func
+def lifted_matrix(m, w: ti.template()):
+    """The (3,3) matrix of an element's (d,d), zero across the plane."""
+    zero = 0.0 * m[0, 0]
+    return (
+        m
+        if ti.static(w.d == 3)
+        else ti.Matrix([[m[0, 0], zero, m[0, 1]], [zero, zero, zero], [m[1, 0], zero, m[1, 1]]])
+    )
 
 
 @ti.func
 def edges(field: ti.template(), w: ti.template(), e: ti.i32):
-    """Differences of a node field to the element's first node, as columns (3,3)."""
+    """Differences of a node field to the element's first node, as columns (d,d)."""
     cell = w.cell[e]
-    first = field[cell[0]]
-    return ti.Matrix.cols([field[cell[1]] - first, field[cell[2]] - first, field[cell[3]] - first])
+    first = seen(field[cell[0]], w)
+    return ti.Matrix.cols([seen(field[cell[k]], w) - first for k in ti.static(range(1, w.corners))])
 
 
 @ti.func
@@ -25,29 +55,36 @@ def _symmetric(m):
 
 @ti.func
 def _plastic(w: ti.template(), e: ti.i32):
-    """Plastic strain as a matrix."""
+    """Plastic strain as a matrix (d,d)."""
     p = w.plastic[e]
-    return ti.Matrix([[p[0], p[3], p[5]], [p[3], p[1], p[4]], [p[5], p[4], p[2]]])
+    place = ti.static(((0, 3, 5), (3, 1, 4), (5, 4, 2)))
+    return ti.Matrix([[p[place[i][j]] for j in ti.static(AXES[w.d])] for i in ti.static(AXES[w.d])])
 
 
 @ti.func
 def _strain(F, R, w: ti.template(), e: ti.i32):
     """Elastic strain in the rotated frame: sym(R^T F) - I - eps_p."""
     strain = _symmetric(R.transpose() @ F) - _plastic(w, e)
-    for k in ti.static(range(3)):
+    for k in ti.static(range(w.d)):
         strain[k, k] -= 1
     return strain
 
 
 @ti.func
 def rotation_of(w: ti.template(), e: ti.i32, F, most: ti.i32, keep: ti.i32):
-    """Rotation of element e, found from its last one, which it replaces if `keep`; the identity if linear."""
-    R = ti.Matrix.identity(w.real, 3)
-    if w.table[w.material[e]][MODEL] > LINEAR:
-        q = rotation.nearest_rotation(F, w.rotation[e], ti.cast(ti.static(_tolerance(w.precision)), w.real), most)
-        if keep:
-            w.rotation[e] = q
-        R = rotation.rotation_of(q)
+    """Rotation (d,d) of element e, found from its last one, which it replaces if `keep`; the identity if linear."""
+    R = ti.Matrix.identity(w.real, w.d)
+    model = w.table[w.material[e]][MODEL]
+    if model == QUICK:
+        R = rotation.orthonormal(F)
+    elif model > LINEAR:
+        if ti.static(w.d == 2):
+            R = rotation.nearest_rotation_2d(F)
+        else:
+            q = rotation.nearest_rotation(F, w.rotation[e], ti.cast(ti.static(_tolerance(w.precision)), w.real), most)
+            if keep:
+                w.rotation[e] = q
+            R = rotation.rotation_of(q)
     return R
 
 
@@ -58,24 +95,30 @@ def _tolerance(precision: str) -> float:
 
 @ti.func
 def gradient(w: ti.template(), e: ti.i32, a: ti.i32):
-    """Shape gradient g_a of corner a (3,) [1/m]."""
+    """Shape gradient g_a of corner a (d,) [1/m]."""
     D = w.gradients[e]
-    g = -ti.Vector([D[0, k] + D[1, k] + D[2, k] for k in ti.static(range(3))])
-    for b in ti.static(range(3)):
-        if a == b + 1:
-            g = ti.Vector([D[b, k] for k in ti.static(range(3))])
+    g = ti.Vector.zero(w.real, w.d)
+    for b in ti.static(range(w.d)):
+        row = ti.Vector([D[b, k] for k in ti.static(range(w.d))])
+        if a == 0:
+            g -= row
+        elif a == b + 1:
+            g = row
     return g
 
 
 @ti.func
 def with_first(rows):
-    """The rows 1..3 of a quantity of the corners, and before them row 0: minus their sum (4,3)."""
-    return ti.Matrix.rows(
+    """The rows 1..d of a quantity of the corners, and before them row 0: minus their sum (d+1,d)."""
+    n = ti.static(rows.n)
+    first = ti.Vector([-rows[0, k] for k in ti.static(range(n))])
+    for b in ti.static(range(1, n)):
+        first -= ti.Vector([rows[b, k] for k in ti.static(range(n))])
+    # Taichi looks at both sides of a choice, so the index has to be valid in the first row as well.
+    return ti.Matrix(
         [
-            ti.Vector([-(rows[0, k] + rows[1, k] + rows[2, k]) for k in ti.static(range(3))]),
-            ti.Vector([rows[0, k] for k in ti.static(range(3))]),
-            ti.Vector([rows[1, k] for k in ti.static(range(3))]),
-            ti.Vector([rows[2, k] for k in ti.static(range(3))]),
+            [rows[(a - 1) % n, k] if ti.static(a > 0) else first[k] for k in ti.static(range(n))]
+            for a in ti.static(range(n + 1))
         ]
     )
 
@@ -100,7 +143,7 @@ def deform(
     """
     for e in range(n_elements):
         row = w.table[w.material[e]]
-        if row[MODEL] >= FIRST_LAW:
+        if row[MODEL] > QUICK:
             continue
         gradients = w.gradients[e]
         F = edges(w.x, w, e) @ gradients
@@ -118,13 +161,13 @@ def deform(
 
 @ti.func
 def gathered_force(w: ti.template(), i: ti.i32):
-    """Sum of the corner forces at node i [N], in the order of the elements."""
-    total = ti.Vector.zero(w.real, 3)
+    """Sum of the corner forces at node i (3,) [N], in the order of the elements."""
+    total = ti.Vector.zero(w.real, w.d)
     for k in range(w.incident_start[i], w.incident_start[i + 1]):
         e, a = w.incident[k] >> 2, w.incident[k] & 3
         f = w.corner_force[e]
-        total += ti.Vector([f[a, 0], f[a, 1], f[a, 2]])
-    return total
+        total += ti.Vector([f[a, k] for k in ti.static(range(w.d))])
+    return lifted(total, w)
 
 
 @ti.kernel
@@ -140,20 +183,25 @@ def measure(w: ti.template(), n_elements: ti.i32, most: ti.i32):
 
     Corotational: P F^T / det F; where an element is flat or inside out that has no meaning, and the
     rotated stress R sigma R^T stands in, which is the same for small strain. Linear: sigma itself.
+    In the plane, the stress across it is what holds that strain at zero.
     """
     for e in range(n_elements):
         row = w.table[w.material[e]]
-        if row[MODEL] >= FIRST_LAW:
+        if row[MODEL] > QUICK:
             continue
         F = edges(w.x, w, e) @ w.gradients[e]
         R = rotation_of(w, e, F, most, 0)
         strain = _strain(F, R, w, e)
         sigma = hooke.stress(strain, row[LAMBDA], row[MU])
         cauchy = R @ sigma @ R.transpose()
+        across = row[LAMBDA] * strain.trace()
         det = F.determinant()
         if row[MODEL] > LINEAR and det > 0:
             cauchy = R @ sigma @ F.transpose() / det
-        w.stress[e] = cauchy
+            across /= det
+        w.stress[e] = lifted_matrix(cauchy, w)
+        if ti.static(w.d == 2):
+            w.stress[e][1, 1] = across
         w.energy[e] = w.volume[e] * hooke.energy_density(strain, row[LAMBDA], row[MU])
 
 
@@ -161,8 +209,8 @@ def measure(w: ti.template(), n_elements: ti.i32, most: ti.i32):
 def gather_masses(w: ti.template(), n: ti.i32, n_bodies: ti.i32):
     """Lumped mass and mass-proportional damping of the nodes, and what sizes their contact springs.
 
-    `w.contact_stiffness` [N/m] is the trace of the node's own stiffness block at rest, which no rotation changes,
-    over 3; `w.body_mass` [kg] is the mass of its body.
+    `w.contact_stiffness` [N/m] is the mean diagonal entry of the node's own stiffness block at rest, which no
+    rotation changes; `w.body_mass` [kg] is the mass of its body.
     """
     for i in range(n):
         mass, drag, stiffness = ti.cast(0.0, w.real), ti.cast(0.0, w.real), ti.cast(0.0, w.real)
@@ -170,10 +218,10 @@ def gather_masses(w: ti.template(), n: ti.i32, n_bodies: ti.i32):
             e, a = w.incident[k] >> 2, w.incident[k] & 3
             row = w.table[w.material[e]]
             g = gradient(w, e, a)
-            share = row[DENSITY] * w.volume[e] / 4
+            share = row[DENSITY] * w.volume[e] / w.corners
             mass += share
             drag += share * row[MASS_DAMPING]
-            stiffness += w.volume[e] * (row[LAMBDA] + 4 * row[MU]) * g.norm_sqr() / 3
+            stiffness += w.volume[e] * (row[LAMBDA] + (w.d + 1) * row[MU]) * g.norm_sqr() / w.d
         w.mass[i] = mass
         w.drag[i] = drag
         w.contact_stiffness[i] = stiffness

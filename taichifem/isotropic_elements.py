@@ -9,14 +9,11 @@ from taichifem import elements
 from taichifem.formulas import eigen, isotropic
 from taichifem.runtime import ti
 
-CORNERS = 10
-"""Pairs a <= b of an element's corners, and so blocks of its stiffness that are stored."""
-
 
 @ti.func
-def corner_pair(a: ti.i32, b: ti.i32):
-    """Number of the pair a <= b among 00 01 02 03 11 12 13 22 23 33."""
-    return a * 4 + b - a * (a + 1) // 2
+def corner_pair(w: ti.template(), a: ti.i32, b: ti.i32):
+    """Number of the pair a <= b of corners among 00 01 02 03 11 12 13 22 23 33, or 00 01 02 11 12 22."""
+    return a * w.corners + b - a * (a + 1) // 2
 
 
 @ti.kernel
@@ -29,6 +26,17 @@ def decompose(w: ti.template(), n_elements: ti.i32, most: ti.i32, keep: ti.i32):
             w.svd_u[e] = U
             w.svd_v[e] = V
             w.stretch[e] = s
+
+
+@ti.kernel
+def push(w: ti.template(), law: ti.template(), number: ti.i32, n_elements: ti.i32):
+    """After `decompose`: the elastic corner forces of the elements of law `number`, and nothing else."""
+    for e in range(n_elements):
+        row = w.table[w.material[e]]
+        if row[elements.MODEL] == number:
+            slope = law.slope(w.stretch[e], row[elements.LAMBDA], row[elements.MU])
+            P = isotropic.first_piola(w.svd_u[e], slope, w.svd_v[e])
+            w.corner_force[e] = elements.with_first(-w.volume[e] * (w.gradients[e] @ P.transpose()))
 
 
 @ti.kernel
@@ -64,14 +72,14 @@ def respond(
 @ti.kernel
 def store_blocks(w: ti.template(), n_elements: ti.i32, stiffness_factor: ti.f64, damping_factor: ti.f64):
     """After `respond`: blocks V K_ab, times stiffness_factor + damping_factor beta, in `w.tangent`."""
-    for k in range(n_elements * CORNERS):
-        e = k // CORNERS
+    for k in range(n_elements * w.corner_pairs):
+        e = k // w.corner_pairs
         row = w.table[w.material[e]]
         if row[elements.MODEL] >= elements.FIRST_LAW:
-            # Pair number back to corners: rows of 4, 3, 2 and 1.
-            left, a = k % CORNERS, 0
-            while left >= 4 - a:
-                left -= 4 - a
+            # Pair number back to corners: rows of 4, 3, 2 and 1, or of 3, 2 and 1.
+            left, a = k % w.corner_pairs, 0
+            while left >= w.corners - a:
+                left -= w.corners - a
                 a += 1
             b = a + left
             damping = row[elements.STIFFNESS_DAMPING]
@@ -90,6 +98,8 @@ def measure(w: ti.template(), law: ti.template(), number: ti.i32, n_elements: ti
         row = w.table[w.material[e]]
         if row[elements.MODEL] == number:
             la, mu = row[elements.LAMBDA], row[elements.MU]
-            s = w.stretch[e]
-            w.stress[e] = isotropic.cauchy(w.svd_u[e], law.slope(s, la, mu), s)
+            s, slope = w.stretch[e], law.slope(w.stretch[e], la, mu)
+            w.stress[e] = elements.lifted_matrix(isotropic.cauchy(w.svd_u[e], slope, s), w)
+            if ti.static(w.d == 2):
+                w.stress[e][1, 1] = isotropic.cauchy_across(law, s, la, mu)
             w.energy[e] = w.volume[e] * law.energy(s, la, mu)

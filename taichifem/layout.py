@@ -2,13 +2,17 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass, field
+from itertools import combinations
 
 import numpy as np
 
-from taichifem.description import Body, Handle, Material, Motion, Pin, Region, Scene
+from taichifem.description import Body, Handle, Load, Material, Motion, Pin, Region, Scene
 from taichifem.errors import InputError
-from taichifem.mesh import TetMesh
+
+AXES = {2: [0, 2], 3: [0, 1, 2]}
+"""Coordinates that matter to bodies of dimension 2 (in the plane y = 0) and 3."""
 
 
 @dataclass
@@ -28,16 +32,32 @@ class Group:
 
 
 @dataclass
+class LoadGroup:
+    """A load and what it acts on: nodes (n,) for a Force, boundary faces (k,d) with nodes for the others.
+
+    thickness: of the body [m], for loads on the edges of planar bodies; 1 otherwise.
+    """
+
+    load: Load
+    where: np.ndarray
+    thickness: float = 1.0
+
+
+@dataclass
 class Layout:
     """Arrays of a whole scene. Nodes and elements of a body are a contiguous range.
 
-    rest (n,3) [m], velocities (n,3) [m/s], cells (m,4), node_bodies (n,), cell_bodies (m,), cell_materials (m,)
-    into `materials`, regions (m,), surface (k,3) outward triangles, surface_bodies (k,), body_start (bodies+1,).
+    dimension d: 3 for tetrahedra, 2 for triangles in the plane y = 0.
+    rest (n,3) [m], velocities (n,3) [m/s], cells (m,d+1), thickness (m,) [m] (1 in space), node_bodies (n,),
+    cell_bodies (m,), cell_materials (m,) into `materials`, regions (m,), surface (k,3) triangles to draw, outward,
+    surface_bodies (k,), body_start (bodies+1,).
     """
 
+    dimension: int
     rest: np.ndarray
     velocities: np.ndarray
     cells: np.ndarray
+    thickness: np.ndarray
     node_bodies: np.ndarray
     cell_bodies: np.ndarray
     cell_materials: np.ndarray
@@ -49,20 +69,29 @@ class Layout:
     material_of: dict[tuple[int, int | None], int]
     pins: list[Group] = field(default_factory=list)
     handles: list[Group] = field(default_factory=list)
+    loads: list[LoadGroup] = field(default_factory=list)
 
     @property
     def gradients(self) -> np.ndarray:
-        """D_m^-1 of every element (m,3,3): its rows are the shape gradients g_1..g_3 [1/m]."""
+        """D_m^-1 of every element (m,d,d): its rows are the shape gradients g_1..g_d [1/m]."""
         return np.linalg.inv(self._edges())
 
     @property
     def volumes(self) -> np.ndarray:
         """Rest volumes (m,) [m^3]."""
-        return np.linalg.det(self._edges()) / 6
+        return np.linalg.det(self._edges()) * self.thickness / math.factorial(self.dimension)
 
     def _edges(self) -> np.ndarray:
-        corners = self.rest[self.cells]
+        corners = self.rest[self.cells][:, :, AXES[self.dimension]]
         return (corners[:, 1:] - corners[:, :1]).transpose(0, 2, 1)
+
+    @property
+    def edge_shares(self) -> np.ndarray:
+        """1 over the number of elements around each edge of each element (m, edges), edges 01 02 .. 12 .. in order."""
+        pairs = list(combinations(range(self.dimension + 1), 2))
+        ends = np.sort(self.cells[:, pairs].reshape(-1, 2).astype(np.int64), axis=1)
+        _, which, count = np.unique(ends @ (len(self.rest), 1), return_inverse=True, return_counts=True)
+        return (1.0 / count[which]).reshape(len(self.cells), len(pairs))
 
 
 def _selected(region: Region, points: np.ndarray, first: int, where: str) -> np.ndarray:
@@ -89,15 +118,38 @@ def _groups(body: Body, label: str, points: np.ndarray, first: int) -> tuple[lis
     return pins, handles
 
 
+def _loads(body: Body, label: str, points: np.ndarray, first: int) -> list[LoadGroup]:
+    found = [LoadGroup(f, _selected(f.region, points, first, f"{label}.force.{k}")) for k, f in enumerate(body.forces)]
+    boundary = body.mesh.boundary()
+    for kind, loads in (("traction", body.tractions), ("pressure", body.pressures)):
+        for k, load in enumerate(loads):
+            where = f"{label}.{kind}.{k}"
+            inside = np.zeros(len(points), dtype=bool)
+            inside[_selected(load.region, points, 0, where)] = True
+            faces = boundary[inside[boundary].all(axis=1)]
+            if not len(faces):
+                raise InputError(f"{where} selects nodes but no face of the surface: make its region larger")
+            found.append(LoadGroup(load, faces + first, body.thickness if body.mesh.dimension == 2 else 1.0))
+    return found
+
+
+def _dimension(scene: Scene) -> int:
+    dimensions = {body.mesh.dimension for body in scene.bodies}
+    if len(dimensions) > 1:
+        raise InputError("the scene mixes planar bodies (triangles) with solid ones (tetrahedra): keep one kind")
+    return dimensions.pop()
+
+
 def lay_out(scene: Scene) -> Layout:
-    """Concatenate the scene's bodies. Raises InputError where a pin or handle selects nothing."""
-    rest, velocities, cells, node_bodies, cell_bodies, cell_materials = [], [], [], [], [], []
+    """Concatenate the scene's bodies. Raises InputError where a pin, handle or load selects nothing."""
+    rest, velocities, cells, thickness, node_bodies, cell_bodies, cell_materials = [], [], [], [], [], [], []
     regions, surface, surface_bodies, body_start = [], [], [], [0]
     materials: list[Material] = []
     material_of: dict[tuple[int, int | None], int] = {}
-    pins, handles = [], []
+    pins, handles, loads = [], [], []
+    dimension = _dimension(scene)
     for b, body in enumerate(scene.bodies):
-        mesh: TetMesh = body.mesh
+        mesh = body.mesh
         points, first = body.placed_points(), body_start[-1]
         label = f"body.{body.name or b}"
         row = np.full(len(mesh.cells), len(materials), dtype=np.int32)
@@ -111,6 +163,7 @@ def lay_out(scene: Scene) -> Layout:
         arm = points - points.mean(axis=0)
         velocities.append(np.asarray(body.velocity) + np.cross(np.asarray(body.spin), arm))
         cells.append(mesh.cells + first)
+        thickness.append(np.full(len(mesh.cells), body.thickness if dimension == 2 else 1.0))
         cell_materials.append(row)
         regions.append(mesh.regions)
         node_bodies.append(np.full(len(points), b, dtype=np.int32))
@@ -121,11 +174,14 @@ def lay_out(scene: Scene) -> Layout:
         held, pulled = _groups(body, label, points, first)
         pins += held
         handles += pulled
+        loads += _loads(body, label, points, first)
         body_start.append(first + len(points))
     return Layout(
+        dimension=dimension,
         rest=np.concatenate(rest),
         velocities=np.concatenate(velocities),
         cells=np.concatenate(cells).astype(np.int32),
+        thickness=np.concatenate(thickness),
         node_bodies=np.concatenate(node_bodies),
         cell_bodies=np.concatenate(cell_bodies),
         cell_materials=np.concatenate(cell_materials),
@@ -137,4 +193,5 @@ def lay_out(scene: Scene) -> Layout:
         material_of=material_of,
         pins=pins,
         handles=handles,
+        loads=loads,
     )

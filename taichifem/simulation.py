@@ -2,32 +2,33 @@
 
 from __future__ import annotations
 
+import math
 import os
+from collections.abc import Callable
+from dataclasses import asdict
 
 import numpy as np
-import scipy.sparse
 
-from taichifem import checkpoint, elements, runtime, transfer
-from taichifem.description import Collider, Material, Scene
-from taichifem.description.check import whole
+from taichifem import checkpoint, transfer
+from taichifem.bodies import Bodies
+from taichifem.clock import Clock
+from taichifem.description import Collider, Load, Material, Scene
 from taichifem.errors import Diverged, InputError
-from taichifem.integrators import backward_euler
-from taichifem.integrators.backward_euler import StepReport
-from taichifem.laws import Laws
-from taichifem.layout import Layout, lay_out
-from taichifem.linear_algebra import assembly, balance
-from taichifem.linear_algebra.pattern import BlockPattern, block_pattern
+from taichifem.integrators import ADVANCE, HISTORY, implicit, symplectic_euler
+from taichifem.integrators.step import Options, Step, StepReport
 from taichifem.stats import Stats, figures
-from taichifem.surroundings import Surroundings, pose
+from taichifem.supports import check_supports
 from taichifem.timing import PhaseTimer
-from taichifem.world import Capacity, Counts, World, acquire
+
+PAST = ("past_x", "past_v")
+"""Fields of integrators that look further back."""
 
 
-class Simulation:
+class Simulation(Bodies):
     """The state of a scene over time. Arrays in and out are NumPy, float64, SI units; z points up.
 
     precision: "f32" (real time) or "f64".  arch, threads: as `taichifem.runtime.start`; None keeps what runs.
-    Raises InputError for what cannot be simulated.
+    Raises InputError for what cannot be simulated: among others, explicit steps longer than stability allows.
     """
 
     def __init__(
@@ -38,274 +39,155 @@ class Simulation:
         arch: str | None = None,
         threads: int | None = None,
     ) -> None:
-        if precision not in runtime.PRECISIONS:
-            raise InputError(f'precision is {precision!r}: choose "f32" or "f64"')
-        runtime.start(arch=arch, threads=threads)
-        self.scene = scene
-        self.precision = precision
-        self.step_count = 0
-        self._layout: Layout = lay_out(scene)
-        self._pattern: BlockPattern = block_pattern(self._layout.cells, len(self._layout.rest))
-        self._materials = list(self._layout.materials)
-        self._laws = Laws(self._materials)
-        self._options = backward_euler.Options(
-            tolerance=scene.tolerance,
-            max_iterations=scene.max_iterations,
-            newton=20 if scene.integrator == "backward-euler-newton" else 1,
-            newton_tolerance=scene.newton_tolerance,
-        )
-        self._generation = runtime.generation
-        self._world: World = acquire(self._capacity(), precision, self)
+        super().__init__(scene, precision=precision, arch=arch, threads=threads)
         self._timer = PhaseTimer()
         self._report = StepReport()
         self._stats: Stats | None = None
-        self._counts = Counts(
-            nodes=len(self._layout.rest),
-            elements=len(self._layout.cells),
-            pairs=self._pattern.n_pairs,
-            bodies=len(scene.bodies),
-            colliders=len(scene.colliders),
-        )
-        with self._kernels():
-            transfer.fill(self._world, self._layout, self._pattern)
-        self._surroundings = Surroundings(self.scene, self._layout, self._world, self._counts)
-        self._surround(0.0)
-
-    def _capacity(self) -> Capacity:
-        layout, pattern = self._layout, self._pattern
-        return Capacity(
-            nodes=len(layout.rest),
-            elements=len(layout.cells),
-            blocks=pattern.n_blocks,
-            pairs=pattern.n_pairs,
-            materials=len(layout.materials),
-            colliders=len(self.scene.colliders),
-            held=1 + sum(len(g.nodes) for g in layout.pins),
-            pulled=1 + sum(len(g.nodes) for g in layout.handles),
-            poses=len(layout.pins) + len(layout.handles),
-            bodies=len(self.scene.bodies),
-            tangents=self._laws.stores_tangents,
-        )
-
-    def _kernels(self):
-        """Around every use of the fields: the right precision, and fields that still exist."""
-        if self._generation != runtime.generation:
-            raise InputError("this simulation ended when Taichi was restarted with another arch or thread count")
-        return runtime.precision_of(self.precision)
+        self._fresh = True
+        self._loaded: list[float] | None = None
+        self._explicit = scene.integrator == "symplectic-euler"
+        self._clock = Clock(fps=scene.fps, substeps=scene.substeps or 1)
+        if scene.integrator == "quasi-static":
+            check_supports(scene, self._layout)
+        self._surround(0.0, self.dt)
+        if self._explicit:
+            self._keep_stable()
 
     # Time
 
-    def step(self) -> None:
-        """Advance by one time step. Raises Diverged, with the state before the step kept, on NaN or infinity."""
-        dt = self.scene.dt
-        end = (self.step_count + 1) * dt
-        self._timer.reset()
-        with self._timer.phase("set-up"):
-            self._surround(end)
-        with self._kernels():
-            try:
-                self._report = backward_euler.advance(
-                    self._world,
-                    self._counts,
-                    self._laws,
-                    dt=dt,
-                    gravity=np.asarray(self.scene.gravity, dtype=float),
-                    options=self._options,
-                    timer=self._timer,
-                )
-            except Diverged as error:
-                backward_euler.go_back(self._world, self._counts.nodes)
-                raise Diverged(f"the simulation diverged at t = {self.time:.4g} s: {error}") from None
-        self.step_count += 1
-        self._stats = None
+    @property
+    def dt(self) -> float:
+        """Time step [s]."""
+        return self._clock.dt
 
-    def advance_frame(self) -> None:
-        """Advance by one frame: `scene.substeps` steps."""
-        for _ in range(self.scene.substeps):
-            self.step()
-
-    def advance(self, *, seconds: float) -> None:
-        """Advance by `seconds`, rounded to whole steps."""
-        for _ in range(round(seconds / self.scene.dt)):
-            self.step()
+    @property
+    def substeps(self) -> int:
+        """Steps a frame."""
+        return self._clock.substeps
 
     @property
     def time(self) -> float:
         """Simulated time [s]."""
-        return self.step_count * self.scene.dt
+        return self._clock.time
 
     @property
     def frame(self) -> int:
         """Frames completed."""
-        return self.step_count // self.scene.substeps
+        return self._clock.frame
+
+    @property
+    def step_count(self) -> int:
+        """Steps completed."""
+        return self._clock.steps
+
+    def step(self) -> None:
+        """Advance by one time step. Raises Diverged, with the state before the step kept, on NaN or infinity."""
+        if self._explicit and self._clock.substep == 0 and self.scene.substeps is None and not self._laws.linear:
+            self._keep_stable()
+        self._timer.reset()
+        with self._timer.phase("set-up"):
+            self._surround(self._clock.end, self.dt)
+            self._put_loads(self._clock.end)
+        self._advance(np.asarray(self.scene.gravity, dtype=float))
+        self._clock.tick()
+        self._fresh = False
+
+    def _advance(self, gravity: np.ndarray, **options: object) -> None:
+        """One step of the scene's integrator under what the world holds; `options` replace those of the scene."""
+        scene = self.scene
+        chosen = {
+            "tolerance": scene.tolerance,
+            "max_iterations": scene.max_iterations,
+            "newton_tolerance": scene.newton_tolerance,
+        }
+        step = Step(
+            w=self._world,
+            counts=self._counts,
+            laws=self._laws,
+            dt=self.dt,
+            gravity=gravity,
+            options=Options(**chosen | options),
+            timer=self._timer,
+            follow=self._follow if self._loading.follows else None,
+            fresh=self._fresh,
+            damped=any(m.stiffness_damping > 0 for m in self._materials),
+        )
+        self._stats = None
+        with self._kernels():
+            try:
+                self._report = ADVANCE[scene.integrator](step)
+            except Diverged as error:
+                implicit.go_back(self._world, self._counts.nodes)
+                raise Diverged(f"the simulation diverged at t = {self.time:.4g} s: {error}") from None
+
+    def advance_frame(self) -> None:
+        """Advance to the next frame: `substeps` steps, or what is left of them."""
+        frame = self.frame
+        while self.frame == frame:
+            self.step()
+
+    def advance(self, *, seconds: float) -> None:
+        """Advance by `seconds`, rounded to whole steps."""
+        end = self.time + seconds
+        while self.time + 0.5 * self.dt < end:
+            self.step()
+
+    def _keep_stable(self) -> None:
+        """Choose the steps a frame of an explicit method, or refuse those the scene asks for."""
+        critical = self.critical_step()
+        longest = 1.0 / (self.scene.fps * critical) if critical < math.inf else 0.0
+        if self.scene.substeps is None:
+            self._clock.substeps = max(1, math.ceil(longest / symplectic_euler.SAFETY))
+        elif self.dt > critical:
+            raise InputError(
+                f"simulation.substeps is {self.scene.substeps}, a step of {1e3 * self.dt:.4g} ms, and symplectic Euler "
+                f"is stable up to {1e3 * critical:.4g} ms here: give at least {math.ceil(longest)}, or leave it out"
+            )
+
+    # Loads
+
+    def _put_loads(self, time: float) -> None:
+        """Give the world the loads at `time` [s], if they changed."""
+        shares = self._loading.shares(time)
+        if shares != self._loaded:
+            self._send_loads(lambda load: load.share_at(time))
+            self._loaded = shares
+
+    def _send_loads(self, share: Callable[[Load], float]) -> None:
+        self._loaded = None
+        self._share = share
+        with self._kernels():
+            self._follow()
+
+    def _follow(self) -> None:
+        """Loads on the surface as it is now; on that at rest where all displacements count as small."""
+        positions = None if self._laws.linear or not self._loading.follows else self._read(self._world.x)
+        transfer.write(self._world, self._world.outside, self._loading.forces(self._share, positions))
 
     # Surroundings and materials
 
     def collider_poses(self) -> list[tuple[Collider, np.ndarray, np.ndarray]]:
         """Each collider with the rotation R (3,3) and offset c (3,) [m] that move it now: x = R X + c."""
-        return [(c, *pose(c.motion, self.time)) for c in self.scene.colliders]
-
-    def _fill_table(self) -> None:
-        rows = np.array(
-            [
-                [
-                    m.lame_lambda,
-                    m.shear_modulus,
-                    m.mass_damping,
-                    m.stiffness_damping,
-                    m.density,
-                    float(self._laws.number(m)),
-                ]
-                for m in self._materials
-            ]
-        )
-        turning = np.zeros(len(self.scene.bodies), dtype=bool)
-        for (body, _), row in self._layout.material_of.items():
-            turning[body] |= self._materials[row].model != "linear"
-        held = self._surroundings.held_bodies
-        flies = np.where(held, balance.HELD, np.where(turning, balance.TURNS, balance.LINEAR))
-        with self._kernels():
-            transfer.fill_table(self._world, rows, self._layout.body_start, flies)
-            elements.gather_masses(self._world, self._counts.nodes, self._counts.bodies)
-
-    def _surround(self, time: float) -> None:
-        """Put pins, handles and colliders where they stand at `time` [s]."""
-        with self._kernels():
-            changed = self._surroundings.update(time)
-        if changed:
-            self._fill_table()
+        return self._poses(self.time)
 
     def set_material(self, body: int, material: Material, *, region: int | None = None) -> None:
         """Change a body's material (or that of one region of it) from the next step on; nothing recompiles.
 
-        Raises InputError for a region without a material of its own, and for a law that the scene did not have.
+        Raises InputError for a region without a material of its own, for a law that the scene did not have, and
+        for one too stiff for the explicit steps that the scene asks for.
         """
-        row = self._layout.material_of.get((whole("body", body, at_least=0), region))
-        if row is None:
-            raise InputError(f"body {body} has no material for region {region}: name it in Body.materials")
-        if not self._laws.knows(material):
-            raise InputError(f"the scene has no {material.model!r} material yet: make a new simulation for that")
-        self._materials[row] = material
-        self._fill_table()
+        row = self._row(body, region)
+        before = self._materials[row]
+        self._change_material(row, material)
+        if self._explicit and (self.scene.substeps is not None or self._clock.substep == 0):
+            try:
+                self._keep_stable()
+            except InputError:
+                self._change_material(row, before)
+                raise
 
-    # State
-
-    def _read(self, field) -> np.ndarray:
-        with self._kernels():
-            per_element = field in (self._world.stress, self._world.energy, self._world.rotation)
-            count = self._counts.elements if per_element else self._counts.nodes
-            return transfer.read(self._world, field, count).astype(np.float64)
-
-    @property
-    def positions(self) -> np.ndarray:
-        """Node positions (n,3) [m]."""
-        return self._read(self._world.x)
-
-    @property
-    def velocities(self) -> np.ndarray:
-        """Node velocities (n,3) [m/s]."""
-        return self._read(self._world.v)
-
-    @property
-    def masses(self) -> np.ndarray:
-        """Lumped node masses (n,) [kg]."""
-        return self._read(self._world.mass)
-
-    def set_positions(self, x: np.ndarray) -> None:
-        """Move the nodes to x (n,3) [m]."""
-        self._write(self._world.x, "positions", x)
-
-    def set_velocities(self, v: np.ndarray) -> None:
-        """Give the nodes velocities v (n,3) [m/s]."""
-        self._write(self._world.v, "velocities", v)
-
-    def _write(self, field, name: str, array: np.ndarray) -> None:
-        array = np.asarray(array, dtype=np.float64)
-        if array.shape != (self._counts.nodes, 3):
-            raise InputError(f"{name} have shape {array.shape}: give {(self._counts.nodes, 3)}")
-        if not np.isfinite(array).all():
-            raise InputError(f"{name} hold NaN or infinity at node {np.argwhere(~np.isfinite(array))[0, 0]}")
-        with self._kernels():
-            transfer.write(self._world, field, array)
-        self._stats = None
-
-    @property
-    def rest_positions(self) -> np.ndarray:
-        """Rest positions (n,3) [m]."""
-        return self._layout.rest
-
-    @property
-    def cells(self) -> np.ndarray:
-        """Tetrahedra (m,4)."""
-        return self._layout.cells
-
-    @property
-    def cell_bodies(self) -> np.ndarray:
-        """Body of each element (m,)."""
-        return self._layout.cell_bodies
-
-    @property
-    def cell_regions(self) -> np.ndarray:
-        """Region of each element in its mesh (m,)."""
-        return self._layout.regions
-
-    @property
-    def node_bodies(self) -> np.ndarray:
-        """Body of each node (n,)."""
-        return self._layout.node_bodies
-
-    @property
-    def surface(self) -> np.ndarray:
-        """Outward triangles of all bodies (k,3), as node indices."""
-        return self._layout.surface
-
-    @property
-    def surface_bodies(self) -> np.ndarray:
-        """Body of each surface triangle (k,)."""
-        return self._layout.surface_bodies
-
-    # Mechanics at the current state
-
-    def elastic_forces(self) -> np.ndarray:
-        """Elastic forces on the nodes (n,3) [N] at the current positions, without damping."""
-        with self._kernels():
-            self._laws.deform(self._world, self._counts, stiffness=1.0)
-            elements.gather_forces(self._world, self._counts.nodes)
-        return self._read(self._world.force)
-
-    def stiffness(self, *, projected: bool = False) -> scipy.sparse.csr_matrix:
-        """Tangent stiffness K (3n,3n) [N/m] at the current positions, nothing pinned.
-
-        projected: make every element's tangent positive semi-definite first, as the implicit step does.
-        Corotational elements give the warped stiffness R K R^T (Mueller & Gross 2004), the others the exact tangent.
-        """
-        pattern = self._pattern
-        with self._kernels():
-            self._laws.deform(self._world, self._counts, stiffness=1.0, projected=projected)
-            assembly.assemble(self._world, self._counts.pairs, 0.0, 0.0)
-            blocks = transfer.read(self._world, self._world.block, pattern.n_blocks).astype(np.float64)
-        n = 3 * self._counts.nodes
-        return scipy.sparse.bsr_matrix((blocks, pattern.column, pattern.row_start), shape=(n, n)).tocsr()
-
-    def _measure(self) -> None:
-        with self._kernels():
-            self._laws.measure(self._world, self._counts)
-
-    def cauchy_stress(self) -> np.ndarray:
-        """Cauchy stress of each element (m,3,3) [Pa]."""
-        self._measure()
-        return self._read(self._world.stress)
-
-    def von_mises(self) -> np.ndarray:
-        """Equivalent (von Mises) stress of each element (m,) [Pa]."""
-        stress = self.cauchy_stress()
-        deviator = stress - np.trace(stress, axis1=1, axis2=2)[:, None, None] * np.eye(3) / 3
-        return np.sqrt(1.5 * (deviator**2).sum(axis=(1, 2)))
-
-    def elastic_energy(self) -> float:
-        """Elastic energy of everything [J]."""
-        self._measure()
-        return float(self._read(self._world.energy).sum())
+    def _changed(self) -> None:
+        self._stats, self._fresh = None, True
 
     @property
     def report(self) -> StepReport:
@@ -341,7 +223,7 @@ class Simulation:
             layout.rest,
             layout.cells,
             layout.cell_materials,
-            text=f"{self.precision} {len(self.scene.colliders)}",
+            text=f"{self.precision} {len(self.scene.colliders)} {self.scene.integrator}",
         )
 
     def save(self, path: str | os.PathLike) -> None:
@@ -356,23 +238,31 @@ class Simulation:
                 "plastic": transfer.read(w, w.plastic, m),
                 **transfer.read_contacts(w, self._counts.colliders, n),
             }
-        header = {"scene": self._fingerprint(), "step": self.step_count, "dt": self.scene.dt}
+            if self._integrator_remembers:
+                arrays |= {name: transfer.read(w, getattr(w, name), n) for name in PAST}
+        header = {"scene": self._fingerprint(), "clock": asdict(self._clock), "fresh": self._fresh}
         checkpoint.write(path, arrays, header)
 
     def load(self, path: str | os.PathLike) -> None:
-        """Continue from a checkpoint of the same scene and precision, bit for bit as if never interrupted.
+        """Continue from a checkpoint of the same scene, integrator and precision, bit for bit as if never interrupted.
 
         Raises InputError if the file is missing, damaged, or belongs to another scene; nothing changes then.
         """
         arrays, header = checkpoint.read(path)
-        if header.get("scene") != self._fingerprint() or header.get("dt") != self.scene.dt:
+        clock = Clock(**header.get("clock", {"fps": 0}))
+        same_steps = self.scene.substeps is None or clock.substeps == self.scene.substeps
+        if header.get("scene") != self._fingerprint() or clock.fps != self.scene.fps or not same_steps:
             raise InputError(f"{path}: the checkpoint belongs to another scene, time step or precision")
         w = self._world
         with self._kernels():
-            for name in ("x", "v", "dv", "rotation", "plastic"):
+            for name in ("x", "v", "dv", "rotation", "plastic", *(PAST if self._integrator_remembers else ())):
                 transfer.write(w, getattr(w, name), arrays[name])
             transfer.write_contacts(w, arrays)
-        self.step_count = int(header["step"])
+        self._clock, self._fresh = clock, bool(header["fresh"])
         self._surroundings.forget()
-        self._surround(self.time)
-        self._stats = None
+        self._surround(self.time, self.dt)
+        self._stats = self._loaded = None
+
+    @property
+    def _integrator_remembers(self) -> bool:
+        return self.scene.integrator in HISTORY

@@ -18,6 +18,7 @@ class Stats:
     energy: kinetic, elastic, gravity (zero at the origin) and their total [J].
     momentum [kg m/s]; angular_momentum about the origin [kg m^2/s].
     residual: of the last linear solve, relative; converged: False if the iteration cap was hit.
+    linearisations: matrices set up; balanced: False if Newton's method hit its cap.
     """
 
     time: float
@@ -32,6 +33,7 @@ class Stats:
     converged: bool = True
     contact_passes: int = 0
     linearisations: int = 0
+    balanced: bool = True
     contacts: int = 0
     energy: dict[str, float] = field(default_factory=dict)
     momentum: tuple[float, float, float] = (0.0, 0.0, 0.0)
@@ -66,7 +68,7 @@ def figures(simulation: Simulation) -> Stats:
         elements=len(simulation.cells),
         ms=ms,
         ms_per_step=round(sum(ms.values()), 4),
-        **asdict(simulation.report),
+        **{name: value for name, value in asdict(simulation.report).items() if name != "history"},
         contacts=simulation.contacts,
         energy={"kinetic": kinetic, "elastic": elastic, "gravity": gravity, "total": kinetic + elastic + gravity},
         momentum=tuple((m * v).sum(axis=0).tolist()),

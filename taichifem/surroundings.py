@@ -17,10 +17,14 @@ _STILL = (np.eye(3), np.zeros(3))
 
 
 class Surroundings:
-    """Keeps the world's pins, handles and colliders up to date. held_bodies (bodies,): what some pin holds now."""
+    """Keeps the world's pins, handles and colliders up to date.
+
+    held_bodies (bodies,): what some pin holds now.  held (k,5): node, group and axes (1 or 0) of every pinned node.
+    """
 
     def __init__(self, scene: Scene, layout: Layout, world: World, counts: Counts) -> None:
         self.held_bodies = np.zeros(len(scene.bodies), dtype=bool)
+        self.held = np.zeros((0, 5))
         self._scene, self._layout, self._world, self._counts = scene, layout, world, counts
         self._groups: list[Group] = [*layout.pins, *layout.handles]
         self.forget()
@@ -29,19 +33,26 @@ class Surroundings:
         """Send everything again at the next update, as after loading a state."""
         self._active: list[bool] | None = None
 
-    def update(self, time: float) -> bool:
-        """Put everything where it stands at `time` [s]; True if pins or handles began or ceased to act.
+    @property
+    def last_key(self) -> float:
+        """The last time [s] at which a motion has a key; 0 if nothing moves."""
+        motions = [group.motion for group in self._groups] + [c.motion for c in self._scene.colliders]
+        return max((motion.times[-1] for motion in motions if motion is not None), default=0.0)
 
-        What never moves is sent once.
+    def update(self, time: float, dt: float, *, all_act: bool = False) -> bool:
+        """Put everything where it stands at `time` [s], the end of a step of `dt` [s].
+
+        all_act: whatever their times say, all pins and handles do.  What never moves is sent once.
+        Returns True if pins or handles began or ceased to act.
         """
         everything = self._active is None
         motions = [group.motion for group in self._groups]
         if everything or any(m is not None for m in motions):
             transfer.fill_poses(self._world, pose_table(motions, time))
         if everything or any(c.motion is not None for c in self._scene.colliders):
-            table = collider_table(self._scene.colliders, time, self._scene.dt)
+            table = collider_table(self._scene.colliders, time, dt)
             transfer.fill_colliders(self._world, table)
-        active = [group.acts_at(time) for group in self._groups]
+        active = [all_act or group.acts_at(time) for group in self._groups]
         if active == self._active:
             return False
         self._active = active
@@ -64,7 +75,7 @@ class Surroundings:
             else:
                 pulled.append(np.column_stack([group.nodes, which]))
                 stiffness.append(np.full(len(group.nodes), group.stiffness))
-        nodes, springs = np.concatenate(held), np.concatenate(pulled)
+        nodes, springs = self.held, _ = np.concatenate(held), np.concatenate(pulled)
         self._counts.held, self._counts.pulled = len(nodes), len(springs)
         transfer.fill_groups(self._world, nodes, springs, np.concatenate(stiffness))
 

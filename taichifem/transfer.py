@@ -18,6 +18,7 @@ def _fill_nodes(w: ti.template(), rest: _array(), v: _array(), incident_start: _
             w.x[i][k] = rest[i, k]
             w.v[i][k] = v[i, k]
         w.dv[i] = ti.Vector.zero(w.real, 3)
+        w.outside[i] = ti.Vector.zero(w.real, 3)
         for c in range(w.touching.shape[0]):
             w.touching[c, i] = 0
             w.slip[c, i] = ti.Vector.zero(w.real, 3)
@@ -31,12 +32,12 @@ def _fill_nodes(w: ti.template(), rest: _array(), v: _array(), incident_start: _
 @ti.kernel
 def _fill_elements(w: ti.template(), indices: _array(), gradients: _array(), volume: _array()):
     for e in range(indices.shape[0]):
-        for a in ti.static(range(4)):
+        for a in ti.static(range(w.corners)):
             w.cell[e][a] = indices[e, a]
-        w.material[e] = indices[e, 4]
-        w.body[e] = indices[e, 5]
-        for a in ti.static(range(3)):
-            for k in ti.static(range(3)):
+        w.material[e] = indices[e, w.corners]
+        w.body[e] = indices[e, w.corners + 1]
+        for a in ti.static(range(w.d)):
+            for k in ti.static(range(w.d)):
                 w.gradients[e][a, k] = gradients[e, a, k]
         w.volume[e] = volume[e]
         w.rotation[e] = ti.Vector([1.0, 0.0, 0.0, 0.0])
@@ -72,7 +73,7 @@ def _fill_pattern(
 @ti.kernel
 def _fill_table(w: ti.template(), table: _array(), body_start: _array(), body_flies: _array()):
     for i in range(table.shape[0]):
-        for k in ti.static(range(6)):
+        for k in ti.static(range(7)):
             w.table[i][k] = table[i, k]
     for b in range(body_flies.shape[0]):
         w.body_start[b] = body_start[b]
@@ -179,12 +180,14 @@ def fill(w: World, layout: Layout, pattern: BlockPattern) -> None:
     _fill_nodes(w, _real(w, layout.rest), _real(w, layout.velocities), start, incident)
     indices = np.column_stack([layout.cells, layout.cell_materials, layout.cell_bodies]).astype(np.int32)
     _fill_elements(w, indices, _real(w, layout.gradients), _real(w, layout.volumes))
+    if w.capacity.springs:
+        write(w, w.spring_share, layout.edge_shares)
     p = pattern
     _fill_pattern(w, p.row_start, p.column, p.pair_start, p.pair_entry, p.upper, p.lower, p.diagonal)
 
 
 def fill_table(w: World, table: np.ndarray, body_start: np.ndarray, body_flies: np.ndarray) -> None:
-    """Material rows (materials,6), node ranges of the bodies, and how each flies (`linear_algebra.balance`)."""
+    """Material rows (materials,7), node ranges of the bodies, and how each flies (`linear_algebra.balance`)."""
     _fill_table(w, _real(w, table), body_start, body_flies.astype(np.int32))
 
 

@@ -36,14 +36,17 @@ class Capacity:
     pulled: int = 1
     poses: int = 1
     bodies: int = 1
-    tangents: bool = False  # do elements store their stiffness blocks? Isotropic laws need it
+    dimension: int = 3  # of the elements: 3 for tetrahedra, 2 for triangles in the plane y = 0
+    tangents: bool = False  # do elements store their stiffness blocks? Isotropic laws and springs need it
+    springs: bool = False  # are there elements made of springs?
 
     LEAST = (256, 1024, 4096, 2048, 8, 4, 256, 256, 8, 8)
 
     def rounded(self) -> Capacity:
         """The capacity class: every count rounded up to a power of two."""
-        counts = astuple(self)[:-1]
-        return Capacity(*(round_up(n, k) for n, k in zip(counts, self.LEAST, strict=True)), self.tangents)
+        values = astuple(self)
+        counts = (round_up(n, k) for n, k in zip(values, self.LEAST, strict=False))
+        return Capacity(*counts, *values[len(self.LEAST) :])
 
 
 @dataclass
@@ -63,15 +66,20 @@ class Counts:
 class World:
     """Fields of one capacity and precision. Kernels take it as their first argument, by name.
 
-    Nodes: `x` position, `v` velocity, `rest` (all [m], [m/s]), `x0`, `v0` at the start of the step, `mass` [kg],
-    `drag` mass-proportional damping [kg/s], `free` 1 or 0 per axis, `dv` the unknown of the step.
-    Elements: `cell` nodes, `material` row, `gradients` rows g_1..g_3 of D_m^-1 (B of the slides), `volume` [m^3],
-    `rotation` quaternion, `plastic` strain (xx, yy, zz, xy, yz, zx), `body`, and per step `h` (scaled rotated
+    Nodes have three coordinates always; only elements know the dimension d, 3 or 2 (then they lie in the plane
+    y = 0): `x` position, `v` velocity, `rest` (all [m], [m/s]), `x0`, `v0` at the start of the step, `mass` [kg],
+    `drag` mass-proportional damping [kg/s], `outside` loads [N], `free` 1 or 0 per axis, `dv` the unknown of the
+    step, `base_x` and `base_v`: what an implicit step starts from (`integrators.implicit`).
+    Elements: `cell` nodes (d+1), `material` row, `gradients` rows g_1..g_d of D_m^-1 (B of the slides), `volume`
+    [m^3], `rotation` quaternion, `plastic` strain (xx, yy, zz, xy, yz, zx), `body`, and per step `h` (rotated
     gradients) and `corner_force` [N].
     """
 
     def __init__(self, capacity: Capacity, precision: str) -> None:
         self.capacity = capacity
+        self.d = capacity.dimension
+        self.corners = self.d + 1
+        self.corner_pairs = self.corners * (self.corners + 1) // 2
         self.precision = precision
         self.real = runtime.PRECISIONS[precision]
         self._builder = ti.FieldsBuilder()
@@ -100,6 +108,8 @@ class World:
         n = self.capacity.nodes
         self.x, self.v, self.rest = (self._vector(n, 3) for _ in range(3))
         self.x0, self.v0, self.free, self.dv = (self._vector(n, 3) for _ in range(4))
+        self.base_x, self.base_v, self.outside = (self._vector(n, 3) for _ in range(3))
+        self.past_x, self.past_v = self._vector(n, 3), self._vector(n, 3)  # for integrators that look further back
         self.mass, self.drag = self._scalar(n), self._scalar(n)
         self.force = self._vector(n, 3)  # elastic force [N]
         self.load = self._vector(n, 3)  # right-hand side of the step, without contact and handles [N s]
@@ -107,33 +117,36 @@ class World:
         self.incident = self._scalar(4 * self.capacity.elements, ti.i32)
 
     def _place_elements(self) -> None:
-        m = self.capacity.elements
-        self.cell = self._vector(m, 4, ti.i32)
+        m, d, corners = self.capacity.elements, self.d, self.corners
+        self.cell = self._vector(m, corners, ti.i32)
         self.material, self.body = self._scalar(m, ti.i32), self._scalar(m, ti.i32)
-        self.gradients, self.volume = self._matrix(m, 3, 3), self._scalar(m)
+        self.gradients, self.volume = self._matrix(m, d, d), self._scalar(m)
         self.rotation, self.plastic = self._vector(m, 4), self._vector(m, 6)
-        self.h, self.corner_force = self._matrix(m, 4, 3), self._matrix(m, 4, 3)
+        self.h, self.corner_force = self._matrix(m, corners, d), self._matrix(m, corners, d)
         self.moduli = self._vector(m, 2)  # lambda and mu, times the step's factor of K
         self.stress = self._matrix(m, 3, 3)
         self.energy = self._scalar(m)
         # Isotropic laws: F = U diag(stretch) V^T, and the tangent of `formulas.isotropic`.
-        k = m if self.capacity.tangents else 1
-        self.svd_u, self.svd_v, self.tangent_a = (self._matrix(k, 3, 3) for _ in range(3))
-        self.stretch, self.tangent_p, self.tangent_q = (self._vector(k, 3) for _ in range(3))
-        # Material table: lambda, mu [Pa], mass damping [1/s], stiffness damping [s], density, model.
-        self.table = self._vector(self.capacity.materials, 6)
+        k, pairs = m if self.capacity.tangents else 1, d * (d - 1) // 2
+        self.svd_u, self.svd_v, self.tangent_a = (self._matrix(k, d, d) for _ in range(3))
+        self.stretch = self._vector(k, d)
+        self.tangent_p, self.tangent_q = self._vector(k, pairs), self._vector(k, pairs)
+        # Springs: of the stiffness given for a whole edge, the part that each edge of this element has.
+        self.spring_share = self._vector(m if self.capacity.springs else 1, self.corner_pairs - corners)
+        # Material table: the columns are those of `elements`.
+        self.table = self._vector(self.capacity.materials, 7)
 
     def _place_matrix(self) -> None:
         c = self.capacity
         self.row_start, self.column = self._scalar(c.nodes + 1, ti.i32), self._scalar(c.blocks, ti.i32)
         self.pair_start, self.pair_entry = (
             self._scalar(c.pairs + 1, ti.i32),
-            self._scalar(10 * c.elements, ti.i32),
+            self._scalar(self.corner_pairs * c.elements, ti.i32),
         )
         self.upper, self.lower = self._scalar(c.pairs, ti.i32), self._scalar(c.pairs, ti.i32)
         self.diagonal = self._scalar(c.nodes, ti.i32)
         self.block = self._matrix(c.blocks, 3, 3)
-        self.tangent = self._matrix(10 * c.elements if c.tangents else 1, 3, 3)
+        self.tangent = self._matrix(self.corner_pairs * c.elements if c.tangents else 1, self.d, self.d)
         self.spring = self._matrix(c.nodes, 3, 3)  # dt^2 times contact and handle stiffness, on the diagonal
         self.spring_load = self._vector(c.nodes, 3)
         self.sprung = self._scalar(c.nodes, ti.i32)  # 1 where a spring acts

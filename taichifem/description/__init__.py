@@ -1,6 +1,7 @@
 """What a person says: dataclasses with units and checks, no Taichi."""
 
 from taichifem.description.colliders import BoxCollider, Collider, PlaneCollider, SphereCollider
+from taichifem.description.loads import Force, Load, Pressure, Traction
 from taichifem.description.material import Material
 from taichifem.description.motion import Motion
 from taichifem.description.regions import BoxRegion, IndexRegion, NearestRegion, Region, SphereRegion
@@ -13,16 +14,20 @@ __all__ = [
     "BoxRegion",
     "Camera",
     "Collider",
+    "Force",
     "Handle",
     "IndexRegion",
+    "Load",
     "Material",
     "Motion",
     "NearestRegion",
     "Pin",
     "PlaneCollider",
+    "Pressure",
     "Region",
     "Scene",
     "SphereCollider",
     "SphereRegion",
+    "Traction",
     "View",
 ]

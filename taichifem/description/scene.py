@@ -9,6 +9,7 @@ import numpy as np
 
 from taichifem.description import check
 from taichifem.description.colliders import Collider
+from taichifem.description.loads import Force, Pressure, Traction
 from taichifem.description.material import Material
 from taichifem.description.motion import Motion, rotation_matrix
 from taichifem.description.regions import Region
@@ -16,7 +17,7 @@ from taichifem.description.view import Camera, View
 from taichifem.errors import InputError
 from taichifem.mesh import TetMesh
 
-INTEGRATORS = ("backward-euler", "backward-euler-newton")
+INTEGRATORS = ("backward-euler", "backward-euler-newton", "bdf2", "newmark", "symplectic-euler", "quasi-static")
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -68,7 +69,9 @@ class Body:
     material: of all elements;  materials: replaces it where the mesh's region has that number.
     scale, then a turn by `angle` [degrees] about `axis` through the origin, then `position` [m] place it.
     velocity: at the start [m/s].  spin: angular velocity at the start [rad/s], about the centre of the nodes.
-    pins: regions to hold, or Pin objects.  handles: springs that pull.
+    pins: regions to hold, or Pin objects.  handles: springs that pull.  forces, tractions, pressures: loads.
+    A planar mesh (triangles) lies in the plane y = 0, in plane strain; `thickness` [m] is its extent along y. It can
+    be turned about y only.
     """
 
     mesh: TetMesh
@@ -83,9 +86,14 @@ class Body:
     spin: check.Vector = (0.0, 0.0, 0.0)
     pins: Sequence[Region | Pin] = ()
     handles: Sequence[Handle] = ()
+    forces: Sequence[Force] = ()
+    tractions: Sequence[Traction] = ()
+    pressures: Sequence[Pressure] = ()
+    thickness: float = 1.0
 
     def __post_init__(self) -> None:
         check.number("scale", self.scale, above=0)
+        check.number("thickness", self.thickness, above=0, unit="m")
         if not np.linalg.norm(check.vector("axis", self.axis)) > 0:
             raise InputError("axis is (0, 0, 0): give a direction")
         check.number("angle", self.angle, unit="degrees")
@@ -96,10 +104,24 @@ class Body:
         if unknown:
             known = np.unique(self.mesh.regions).tolist()
             raise InputError(f"materials names region {unknown[0]}, but the mesh has only {known}")
+        if self.mesh.dimension == 2:
+            self._check_plane()
+
+    def _check_plane(self) -> None:
+        if self.angle and (self.axis[0] or self.axis[2]):
+            raise InputError(f"axis {tuple(self.axis)} turns a planar body out of its plane: give (0, 1, 0)")
+        for name, leaves in (("position", self.position[1]), ("velocity", self.velocity[1])):
+            if leaves:
+                raise InputError(f"{name} {tuple(getattr(self, name))} leaves the plane of a planar body: y must be 0")
+        if self.spin[0] or self.spin[2]:
+            raise InputError(f"spin {tuple(self.spin)} turns a planar body out of its plane: only y may differ from 0")
 
     def placed_points(self) -> np.ndarray:
         """Rest positions of the nodes in the world (n,3) [m]."""
-        turned = self.scale * self.mesh.points @ rotation_matrix(self.axis, self.angle).T
+        points = self.mesh.points
+        if self.mesh.dimension == 2:
+            points = np.column_stack([points[:, 0], np.zeros(len(points)), points[:, 1]])
+        turned = self.scale * points @ rotation_matrix(self.axis, self.angle).T
         return turned + np.asarray(self.position, dtype=float)
 
 
@@ -107,9 +129,12 @@ class Body:
 class Scene:
     """Everything that is simulated, and how. SI units, z points up.
 
-    gravity: [m/s^2].  fps: frames a second.  substeps: time steps a frame, so dt = 1 / (fps substeps).
+    gravity: [m/s^2].  fps: frames a second.  substeps: time steps a frame, so dt = 1 / (fps substeps); None takes one,
+    and with "symplectic-euler" as many as stability asks for.
     seconds: how long `taichifem run` goes on.
-    integrator: "backward-euler" (one linearisation a step) or "backward-euler-newton" (to convergence).
+    integrator: "backward-euler" (one linearisation a step), "backward-euler-newton" (to convergence), "bdf2" and
+    "newmark" (second order, Newton's method), "symplectic-euler" (explicit), or "quasi-static" (no inertia: balance at
+    every step).
     tolerance: relative residual at which the linear solver stops.  max_iterations: its cap, told when hit.
     newton_tolerance: size of the out-of-balance force, relative to the first, at which Newton's method stops.
     """
@@ -118,7 +143,7 @@ class Scene:
     colliders: Sequence[Collider] = ()
     gravity: check.Vector = (0.0, 0.0, -9.81)
     fps: float = 60
-    substeps: int = 1
+    substeps: int | None = None
     seconds: float = 5.0
     integrator: str = "backward-euler"
     tolerance: float = 1e-3
@@ -138,17 +163,13 @@ class Scene:
                 raise InputError(f"two bodies are called {name!r}: give each its own name")
         check.vector("gravity", self.gravity, unit="m/s^2")
         check.number("fps", self.fps, above=0, unit="1/s")
-        check.whole("substeps", self.substeps)
+        if self.substeps is not None:
+            check.whole("substeps", self.substeps)
         check.number("seconds", self.seconds, above=0, unit="s")
         check.choice("integrator", self.integrator, INTEGRATORS)
         check.number("tolerance", self.tolerance, above=0, below=1)
         check.whole("max_iterations", self.max_iterations)
         check.number("newton_tolerance", self.newton_tolerance, above=0, below=1)
-
-    @property
-    def dt(self) -> float:
-        """Time step [s]."""
-        return 1.0 / (self.fps * self.substeps)
 
     @classmethod
     def from_file(cls, path: str, *, overrides: Sequence[str] = ()) -> Scene:

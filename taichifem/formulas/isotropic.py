@@ -32,14 +32,28 @@ def first_piola(U, slope, V):
 
 
 @ti.func
-def cauchy(U, slope, s):
-    """sigma = P F^T / det F (d,d) [Pa]; s (d,) stretches, none of which counts as less than 1e-6 in size."""
+def _signed(s):
+    """The stretches, none of which counts as less than 1e-6 in size, and their product."""
     size = ti.max(ti.abs(s), 1e-6)
     signed = ti.select(s >= 0, size, -size)
     volume = 1.0
     for k in ti.static(range(s.n)):
         volume *= signed[k]
+    return signed, volume
+
+
+@ti.func
+def cauchy(U, slope, s):
+    """sigma = P F^T / det F (d,d) [Pa]; s (d,) stretches."""
+    signed, volume = _signed(s)
     return _scaled(U, slope * signed / volume) @ U.transpose()
+
+
+@ti.func
+def cauchy_across(model: ti.template(), s, la, mu):
+    """Stress [Pa] across the plane that holds the third stretch at 1, in plane strain; s (2,)."""
+    _, volume = _signed(s)
+    return model.slope(ti.Vector([s[0], s[1], 1.0]), la, mu)[2] / volume
 
 
 @ti.func

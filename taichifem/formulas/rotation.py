@@ -83,3 +83,50 @@ def nearest_rotation(F, start, tolerance, most: ti.i32):
         else:
             left = 0
     return q
+
+
+@ti.func
+def nearest_rotation_2d(F):
+    """The rotation (2,2) that maximises tr(R^T F), in closed form; the identity where every rotation does."""
+    cosine, sine = F[0, 0] + F[1, 1], F[1, 0] - F[0, 1]
+    size = ti.sqrt(cosine * cosine + sine * sine)
+    cosine, sine = ti.select(size > 0, cosine / size, 1.0), ti.select(size > 0, sine / size, 0.0)
+    return ti.Matrix([[cosine, -sine], [sine, cosine]])
+
+
+@ti.func
+def orthonormal(F):
+    """The proper rotation (d,d) of F = R T with T upper triangular: Gram and Schmidt's, quick but not symmetric.
+
+    It follows the element's first edge, so it depends on the order of the corners (Nesme, Payan & Faure 2005).
+    Where a column vanishes or repeats another, an axis that stands across takes its place.
+    """
+    n = ti.static(F.n)
+    columns = F.transpose()
+    ahead = ti.Vector([1.0 if ti.static(k == 0) else 0.0 for k in ti.static(range(n))])
+    first = _across(_row(columns, 0), 0 * ahead, ahead)
+    if ti.static(n == 2):
+        return ti.Matrix.cols([first, ti.Vector([-first[1], first[0]])])
+    else:
+        aside = ti.Vector([0.0, -first[2], first[1]])
+        if ti.abs(first[0]) > 0.9:
+            aside = ti.Vector([-first[2], 0.0, first[0]])
+        second = _across(_row(columns, 1), first, aside.normalized())
+        return ti.Matrix.cols([first, second, first.cross(second)])
+
+
+@ti.func
+def _row(M, k: ti.template()):
+    return ti.Vector([M[k, j] for j in ti.static(range(M.m))])
+
+
+@ti.func
+def _across(v, axis, otherwise):
+    """Unit vector along what v has across the unit vector `axis`; `otherwise` where that is nothing but round-off."""
+    rest = v - v.dot(axis) * axis
+    length = rest.norm()
+    found = otherwise
+    if length > 1e-5 * v.norm():
+        rest /= length
+        found = (rest - rest.dot(axis) * axis).normalized()
+    return found

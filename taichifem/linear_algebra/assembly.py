@@ -9,33 +9,35 @@ from taichifem.runtime import ti
 def _warped(w: ti.template(), e: ti.i32, a: ti.i32, b: ti.i32):
     """Block of corners a and b of a linear or corotational element."""
     h = w.h[e]
-    h_a = ti.Vector([h[a, 0], h[a, 1], h[a, 2]])
-    h_b = ti.Vector([h[b, 0], h[b, 1], h[b, 2]])
+    h_a = ti.Vector([h[a, k] for k in ti.static(range(w.d))])
+    h_b = ti.Vector([h[b, k] for k in ti.static(range(w.d))])
     return hooke.stiffness_block(h_a, h_b, w.moduli[e][0], w.moduli[e][1])
 
 
 @ti.kernel
 def assemble(w: ti.template(), n_pairs: ti.i32, mass_factor: ti.f64, drag_factor: ti.f64):
-    """Gather `w.block` from `w.h` and `w.moduli`, or from `w.tangent` for isotropic laws.
+    """Gather `w.block` from `w.h` and `w.moduli`, or from `w.tangent` for isotropic laws and springs.
 
     On the diagonal come mass_factor * mass + drag_factor * drag.
     The elements' V and the step's factor of K are already in there.
     """
     for p in range(n_pairs):
-        block = ti.Matrix.zero(w.real, 3, 3)
+        total = ti.Matrix.zero(w.real, w.d, w.d)
         for k in range(w.pair_start[p], w.pair_start[p + 1]):
             entry = w.pair_entry[k]
             e, a, b = entry >> 4, (entry >> 2) & 3, entry & 3
             if ti.static(w.capacity.tangents):
-                if w.table[w.material[e]][elements.MODEL] >= elements.FIRST_LAW:
+                if w.table[w.material[e]][elements.MODEL] > elements.QUICK:
+                    first = e * w.corner_pairs
                     if a <= b:
-                        block += w.tangent[e * 10 + isotropic_elements.corner_pair(a, b)]
+                        total += w.tangent[first + isotropic_elements.corner_pair(w, a, b)]
                     else:
-                        block += w.tangent[e * 10 + isotropic_elements.corner_pair(b, a)].transpose()
+                        total += w.tangent[first + isotropic_elements.corner_pair(w, b, a)].transpose()
                 else:
-                    block += _warped(w, e, a, b)
+                    total += _warped(w, e, a, b)
             else:
-                block += _warped(w, e, a, b)
+                total += _warped(w, e, a, b)
+        block = elements.lifted_matrix(total, w)
         i, j = w.upper[p], w.lower[p]
         if i == j:
             node = w.column[i]

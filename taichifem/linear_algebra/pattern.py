@@ -49,7 +49,7 @@ def _starts(sorted_ids: np.ndarray, count: int) -> np.ndarray:
 
 
 def block_pattern(cells: np.ndarray, n_nodes: int) -> BlockPattern:
-    """Pattern for the cells (m,4) of a mesh with `n_nodes` nodes, each of which some cell uses."""
+    """Pattern for the cells (m,d+1) of a mesh with `n_nodes` nodes, each of which some cell uses."""
     corners = cells.shape[1]
     element = np.arange(len(cells), dtype=np.int64)
     keys, entries = [], []
@@ -85,5 +85,5 @@ def block_pattern(cells: np.ndarray, n_nodes: int) -> BlockPattern:
         lower=lower.astype(narrow),
         diagonal=upper[~off].astype(narrow),
         incident_start=_starts(corner[by_node], n_nodes),
-        incident=by_node.astype(narrow),
+        incident=(by_node // corners * 4 + by_node % corners).astype(narrow),
     )

@@ -30,53 +30,54 @@ def _gap(w: ti.template(), c: ti.i32, start, end):
         gap, normal = collision.gap_to_sphere(p0, p1, w.collider_size[c][0])
     elif w.collider_kind[c] == collision.BOX:
         gap, normal = collision.gap_to_box(p0, p1, 0.5 * w.collider_size[c])
-    return gap, R @ normal
+    outward = R @ normal
+    if ti.static(w.d == 2):
+        # A planar body meets the section of the collider: across the plane nothing pushes.
+        outward[1] = 0.0
+        outward = outward.normalized(1e-12)
+    return gap, outward
 
 
 @ti.func
-def _drift(w: ti.template(), c: ti.i32, position, velocity):
-    """Velocity of a node relative to the collider's surface [m/s]."""
-    surface = w.collider_velocity[c] + w.collider_spin[c].cross(position - w.collider_center[c])
-    return velocity - surface
-
-
-@ti.func
-def _spring(w: ti.template(), i: ti.i32, dt):
+def _spring(w: ti.template(), i: ti.i32, h):
     """Stiffness [N/m] of the contact springs of node i."""
-    inertia = 1 / (dt * dt)
+    inertia = 1 / (h * h)
     own = ti.min(w.contact_stiffness[i], w.body_mass[i] * inertia)
     return ti.cast(STIFFNESS, w.real) * ti.max(own, w.mass[i] * inertia)
 
 
 @ti.func
-def _state(w: ti.template(), c: ti.i32, i: ti.i32, dt, velocity):
+def _state(w: ti.template(), c: ti.i32, i: ti.i32, h, dt, velocity):
     """Touching or not, normal force [N], normal, and stretch of the friction spring, at the end velocity."""
-    position = w.x0[i] + dt * velocity
+    position = w.base_x[i] + h * velocity
     distance, normal = _gap(w, c, w.x0[i], position)
     state = NONE
     force = ti.cast(0.0, w.real)
     stretch = ti.Vector.zero(w.real, 3)
     if distance < 0:
-        k = _spring(w, i, dt)
+        k = _spring(w, i, h)
         force = -k * distance
-        stretch = w.slip[c, i] + dt * _drift(w, c, position, velocity)
+        surface = w.collider_velocity[c] + w.collider_spin[c].cross(position - w.collider_center[c])
+        stretch = w.slip[c, i] + ((w.base_x[i] - w.x0[i]) + h * velocity - dt * surface)
+        if ti.static(w.d == 2):
+            stretch[1] = 0.0
         stretch -= stretch.dot(normal) * normal
         state = SLIPS if k * stretch.norm() > w.collider_friction[c] * w.pressed[c, i] else STICKS
     return state, force, normal, stretch
 
 
 @ti.kernel
-def touch(w: ti.template(), n: ti.i32, n_colliders: ti.i32, dt: ti.f64) -> ti.i32:
-    """Add contact springs for the end velocity `w.v + w.dv` guessed so far.
+def touch(w: ti.template(), n: ti.i32, n_colliders: ti.i32, h: ti.f64, dt: ti.f64) -> ti.i32:
+    """Add contact springs for the end velocity `w.v + w.dv` guessed so far; h is that of `integrators.implicit`.
 
     Returns how many contacts opened, closed, began or ceased to slip since the last call.
     """
     changed = 0
     for i in range(n):
-        step = ti.cast(dt, w.real)
+        step, whole = ti.cast(h, w.real), ti.cast(dt, w.real)
         end = w.v[i] + w.dv[i]
         for c in range(n_colliders):
-            state, force, normal, stretch = _state(w, c, i, step, end)
+            state, force, normal, stretch = _state(w, c, i, step, whole, end)
             if state != w.touching[c, i]:
                 w.touching[c, i] = state
                 changed += 1
@@ -90,6 +91,8 @@ def touch(w: ti.template(), n: ti.i32, n_colliders: ti.i32, dt: ti.f64) -> ti.i3
                     side = w.collider_friction[c] * w.pressed[c, i] / stretch.norm()
                 along = normal.outer_product(normal)
                 stiffness = (k - side) * along + side * ti.Matrix.identity(w.real, 3)
+                if ti.static(w.d == 2):
+                    stiffness[1, 1] = 0.0
                 w.sprung[i] = 1
                 w.spring[i] += step * step * stiffness
                 # Both forces are written for dv = 0: what `dv` adds to them stands in the matrix.
@@ -98,16 +101,16 @@ def touch(w: ti.template(), n: ti.i32, n_colliders: ti.i32, dt: ti.f64) -> ti.i3
 
 
 @ti.kernel
-def press(w: ti.template(), n: ti.i32, n_colliders: ti.i32, dt: ti.f64, weight: ti.f64) -> ti.i32:
+def press(w: ti.template(), n: ti.i32, n_colliders: ti.i32, h: ti.f64, dt: ti.f64, weight: ti.f64) -> ti.i32:
     """Set the normal forces that limit friction from the end velocity `w.v + w.dv`.
 
     Returns for how many contacts that matters: `weight` [m/s^2] times the mass is a force that does.
     """
     changed = 0
     for i in range(n):
-        step = ti.cast(dt, w.real)
+        step, whole = ti.cast(h, w.real), ti.cast(dt, w.real)
         for c in range(n_colliders):
-            _, force, _, _ = _state(w, c, i, step, w.v[i] + w.dv[i])
+            _, force, _, _ = _state(w, c, i, step, whole, w.v[i] + w.dv[i])
             share = ti.cast(FRICTION_TOLERANCE, w.real)
             if ti.abs(force - w.pressed[c, i]) > share * (force + w.mass[i] * ti.cast(weight, w.real)):
                 changed += 1
@@ -116,12 +119,12 @@ def press(w: ti.template(), n: ti.i32, n_colliders: ti.i32, dt: ti.f64, weight: 
 
 
 @ti.kernel
-def slide(w: ti.template(), n: ti.i32, n_colliders: ti.i32, dt: ti.f64):
+def slide(w: ti.template(), n: ti.i32, n_colliders: ti.i32, h: ti.f64, dt: ti.f64):
     """At the end of a step, keep the stretch of the friction springs, at most what friction can hold."""
     for i in range(n):
-        step = ti.cast(dt, w.real)
+        step, whole = ti.cast(h, w.real), ti.cast(dt, w.real)
         for c in range(n_colliders):
-            state, force, _, stretch = _state(w, c, i, step, w.v[i])
+            state, force, _, stretch = _state(w, c, i, step, whole, w.v[i])
             most = w.collider_friction[c] * force
             held = _spring(w, i, step) * stretch.norm()
             if held > most:

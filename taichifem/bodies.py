@@ -1,0 +1,274 @@
+"""The bodies of a scene at an instant: their state, and the mechanics that follows from it."""
+
+from __future__ import annotations
+
+import numpy as np
+import scipy.sparse
+
+from taichifem import elements, runtime, transfer
+from taichifem.description import Collider, Material, Scene
+from taichifem.description.check import whole
+from taichifem.errors import InputError
+from taichifem.integrators import EXACT, symplectic_euler
+from taichifem.laws import Laws
+from taichifem.layout import Layout, lay_out
+from taichifem.linear_algebra import assembly, balance
+from taichifem.linear_algebra.pattern import BlockPattern, block_pattern
+from taichifem.linear_algebra.spectrum import highest_frequency
+from taichifem.processes.loading import Loading
+from taichifem.surroundings import Surroundings, pose
+from taichifem.world import Capacity, Counts, World, acquire
+
+
+class Bodies:
+    """All bodies in one world. Arrays in and out are NumPy, float64, SI units; z points up.
+
+    Node arrays are (n,3), also for planar bodies: those lie in the plane y = 0.
+    """
+
+    def __init__(self, scene: Scene, *, precision: str, arch: str | None, threads: int | None) -> None:
+        if precision not in runtime.PRECISIONS:
+            raise InputError(f'precision is {precision!r}: choose "f32" or "f64"')
+        runtime.start(arch=arch, threads=threads)
+        self.scene = scene
+        self.precision = precision
+        self._layout: Layout = lay_out(scene)
+        self._pattern: BlockPattern = block_pattern(self._layout.cells, len(self._layout.rest))
+        self._materials = list(self._layout.materials)
+        self._laws = Laws(self._materials, exact=scene.integrator in EXACT)
+        self._loading = Loading(self._layout)
+        self._generation = runtime.generation
+        self._world: World = acquire(self._capacity(), precision, self)
+        self._counts = Counts(
+            nodes=len(self._layout.rest),
+            elements=len(self._layout.cells),
+            pairs=self._pattern.n_pairs,
+            bodies=len(scene.bodies),
+            colliders=len(scene.colliders),
+        )
+        with self._kernels():
+            transfer.fill(self._world, self._layout, self._pattern)
+        self._surroundings = Surroundings(scene, self._layout, self._world, self._counts)
+
+    def _capacity(self) -> Capacity:
+        layout, pattern = self._layout, self._pattern
+        return Capacity(
+            nodes=len(layout.rest),
+            elements=len(layout.cells),
+            blocks=pattern.n_blocks,
+            pairs=pattern.n_pairs,
+            materials=len(layout.materials),
+            colliders=len(self.scene.colliders),
+            held=1 + sum(len(g.nodes) for g in layout.pins),
+            pulled=1 + sum(len(g.nodes) for g in layout.handles),
+            poses=len(layout.pins) + len(layout.handles),
+            bodies=len(self.scene.bodies),
+            dimension=layout.dimension,
+            tangents=self._laws.stores_tangents,
+            springs=self._laws.springs,
+        )
+
+    def _kernels(self):
+        """Around every use of the fields: the right precision, and fields that still exist."""
+        if self._generation != runtime.generation:
+            raise InputError("this simulation ended when Taichi was restarted with another arch or thread count")
+        return runtime.precision_of(self.precision)
+
+    # Materials and surroundings
+
+    def _fill_table(self) -> None:
+        rows = np.array(
+            [
+                [
+                    m.lame_lambda,
+                    m.shear_modulus,
+                    m.mass_damping,
+                    m.stiffness_damping,
+                    m.density,
+                    float(self._laws.number(m)),
+                    m.spring_stiffness or 0.0,
+                ]
+                for m in self._materials
+            ]
+        )
+        turning = np.zeros(len(self.scene.bodies), dtype=bool)
+        for (body, _), row in self._layout.material_of.items():
+            turning[body] |= self._materials[row].model != "linear"
+        held = self._surroundings.held_bodies
+        flies = np.where(held, balance.HELD, np.where(turning, balance.TURNS, balance.LINEAR))
+        with self._kernels():
+            transfer.fill_table(self._world, rows, self._layout.body_start, flies)
+            elements.gather_masses(self._world, self._counts.nodes, self._counts.bodies)
+
+    def _surround(self, time: float, dt: float, *, all_act: bool = False) -> None:
+        """Put pins, handles and colliders where they stand at `time` [s]."""
+        with self._kernels():
+            changed = self._surroundings.update(time, dt, all_act=all_act)
+        if changed:
+            self._fill_table()
+
+    def _row(self, body: int, region: int | None) -> int:
+        row = self._layout.material_of.get((whole("body", body, at_least=0), region))
+        if row is None:
+            raise InputError(f"body {body} has no material for region {region}: name it in Body.materials")
+        return row
+
+    def _change_material(self, row: int, material: Material) -> None:
+        if not self._laws.knows(material):
+            raise InputError(f"the scene has no {material.model!r} material yet: make a new simulation for that")
+        self._materials[row] = material
+        self._fill_table()
+
+    def _poses(self, time: float) -> list[tuple[Collider, np.ndarray, np.ndarray]]:
+        return [(c, *pose(c.motion, time)) for c in self.scene.colliders]
+
+    # What does not change
+
+    @property
+    def dimension(self) -> int:
+        """3 for tetrahedra, 2 for triangles in the plane y = 0."""
+        return self._layout.dimension
+
+    @property
+    def rest_positions(self) -> np.ndarray:
+        """Rest positions (n,3) [m]."""
+        return self._layout.rest
+
+    @property
+    def cells(self) -> np.ndarray:
+        """Elements (m,d+1): tetrahedra, or triangles of planar bodies."""
+        return self._layout.cells
+
+    @property
+    def cell_bodies(self) -> np.ndarray:
+        """Body of each element (m,)."""
+        return self._layout.cell_bodies
+
+    @property
+    def cell_regions(self) -> np.ndarray:
+        """Region of each element in its mesh (m,)."""
+        return self._layout.regions
+
+    @property
+    def node_bodies(self) -> np.ndarray:
+        """Body of each node (n,)."""
+        return self._layout.node_bodies
+
+    @property
+    def surface(self) -> np.ndarray:
+        """Outward triangles of all bodies (k,3), as node indices; of planar bodies, all their elements."""
+        return self._layout.surface
+
+    @property
+    def surface_bodies(self) -> np.ndarray:
+        """Body of each surface triangle (k,)."""
+        return self._layout.surface_bodies
+
+    # State
+
+    def _read(self, field) -> np.ndarray:
+        with self._kernels():
+            per_element = field in (self._world.stress, self._world.energy, self._world.rotation)
+            count = self._counts.elements if per_element else self._counts.nodes
+            return transfer.read(self._world, field, count).astype(np.float64)
+
+    @property
+    def positions(self) -> np.ndarray:
+        """Node positions (n,3) [m]."""
+        return self._read(self._world.x)
+
+    @property
+    def velocities(self) -> np.ndarray:
+        """Node velocities (n,3) [m/s]."""
+        return self._read(self._world.v)
+
+    @property
+    def masses(self) -> np.ndarray:
+        """Lumped node masses (n,) [kg]."""
+        return self._read(self._world.mass)
+
+    def set_positions(self, x: np.ndarray) -> None:
+        """Move the nodes to x (n,3) [m]."""
+        self._write(self._world.x, "positions", x)
+
+    def set_velocities(self, v: np.ndarray) -> None:
+        """Give the nodes velocities v (n,3) [m/s]."""
+        self._write(self._world.v, "velocities", v)
+
+    def _write(self, field, name: str, array: np.ndarray) -> None:
+        array = np.asarray(array, dtype=np.float64)
+        if array.shape != (self._counts.nodes, 3):
+            raise InputError(f"{name} have shape {array.shape}: give {(self._counts.nodes, 3)}")
+        if not np.isfinite(array).all():
+            raise InputError(f"{name} hold NaN or infinity at node {np.argwhere(~np.isfinite(array))[0, 0]}")
+        with self._kernels():
+            transfer.write(self._world, field, array)
+        self._changed()
+
+    def _changed(self) -> None:
+        """Positions or velocities were set from outside."""
+
+    # Mechanics at the current state
+
+    def elastic_forces(self) -> np.ndarray:
+        """Elastic forces on the nodes (n,3) [N] at the current positions, without damping."""
+        with self._kernels():
+            self._laws.deform(self._world, self._counts, stiffness=1.0)
+            elements.gather_forces(self._world, self._counts.nodes)
+        return self._read(self._world.force)
+
+    def stiffness(self, *, projected: bool = False) -> scipy.sparse.csr_matrix:
+        """Tangent stiffness K (3n,3n) [N/m] at the current positions, nothing pinned.
+
+        projected: make every element's tangent positive semi-definite first, as the implicit step does.
+        Corotational elements give the warped stiffness R K R^T (Mueller & Gross 2004), unless the scene's integrator
+        solves by Newton's method; then they, and all others always, give the exact tangent. Those with rotation "qr"
+        stay with the warped one.
+        """
+        pattern = self._pattern
+        with self._kernels():
+            self._laws.deform(self._world, self._counts, stiffness=1.0, projected=projected)
+            assembly.assemble(self._world, self._counts.pairs, 0.0, 0.0)
+            blocks = transfer.read(self._world, self._world.block, pattern.n_blocks).astype(np.float64)
+        n = 3 * self._counts.nodes
+        return scipy.sparse.bsr_matrix((blocks, pattern.column, pattern.row_start), shape=(n, n)).tocsr()
+
+    def _measure(self) -> None:
+        with self._kernels():
+            self._laws.measure(self._world, self._counts)
+
+    def cauchy_stress(self) -> np.ndarray:
+        """Cauchy stress of each element (m,3,3) [Pa]."""
+        self._measure()
+        return self._read(self._world.stress)
+
+    def von_mises(self) -> np.ndarray:
+        """Equivalent (von Mises) stress of each element (m,) [Pa]."""
+        stress = self.cauchy_stress()
+        deviator = stress - np.trace(stress, axis1=1, axis2=2)[:, None, None] * np.eye(3) / 3
+        return np.sqrt(1.5 * (deviator**2).sum(axis=(1, 2)))
+
+    def elastic_energy(self) -> float:
+        """Elastic energy of everything [J]."""
+        self._measure()
+        return float(self._read(self._world.energy).sum())
+
+    def critical_step(self) -> float:
+        """The longest stable step [s] of symplectic Euler at the current positions; infinite without stiffness.
+
+        From the highest frequency of the elements and masses on the axes that no pin holds, and the largest damping.
+        """
+        held = self._surroundings.held
+        free = np.ones((self._counts.nodes, 3))
+        np.minimum.at(free, held[:, 0].astype(int), 1.0 - held[:, 2:])
+        frequency = highest_frequency(self.stiffness(), self.masses, free)
+        damping = [max(getattr(m, name) for m in self._materials) for name in ("mass_damping", "stiffness_damping")]
+        return symplectic_euler.critical_step(frequency, *damping)
+
+    def reactions(self) -> np.ndarray:
+        """Forces (n,3) [N] with which pins and contact hold the nodes in balance, as far as nothing moves.
+
+        What elastic forces, loads and gravity leave over, on every node: zero but for round-off where nothing holds.
+        """
+        outside = self._read(self._world.outside) + self.masses[:, None] * np.asarray(self.scene.gravity)
+        return -(self.elastic_forces() + outside)

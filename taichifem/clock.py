@@ -1,0 +1,41 @@
+"""Frames, steps and time."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+
+@dataclass
+class Clock:
+    """Counts steps: `substeps` make a frame, `fps` frames a second.
+
+    steps: completed in all.  frame: completed frames.  substep: steps completed of the frame in work.
+    """
+
+    fps: float
+    substeps: int = 1
+    steps: int = 0
+    frame: int = 0
+    substep: int = 0
+
+    @property
+    def dt(self) -> float:
+        """Time step [s]."""
+        return 1.0 / (self.fps * self.substeps)
+
+    @property
+    def time(self) -> float:
+        """Simulated time [s]."""
+        return (self.frame * self.substeps + self.substep) / (self.fps * self.substeps)
+
+    @property
+    def end(self) -> float:
+        """Time [s] at the end of the step in work."""
+        return (self.frame * self.substeps + self.substep + 1) / (self.fps * self.substeps)
+
+    def tick(self) -> None:
+        """A step is done."""
+        self.steps += 1
+        self.substep += 1
+        if self.substep >= self.substeps:
+            self.frame, self.substep = self.frame + 1, 0

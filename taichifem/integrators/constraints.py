@@ -1,0 +1,54 @@
+"""Contact and handles within a step: springs on single nodes, solved again while contacts open, close or slip."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+from taichifem.integrators.step import Step, StepReport
+from taichifem.linear_algebra.pcg import Convergence
+from taichifem.processes import contact, holding
+
+CONTACT_PASSES = 12
+FRICTION_RENEWALS = 2
+
+
+def settle(
+    step: Step, h: float, report: StepReport, solve: Callable[[int], Convergence], *, weight: float
+) -> Convergence:
+    """Solve for `w.dv`, again while contacts change, and while friction does.
+
+    weight: [m/s^2] a force of this times the mass counts as one that matters.
+    """
+    w, n, colliders = step.w, step.counts.nodes, step.counts.colliders
+    renewals = 0
+    for passes in range(1, CONTACT_PASSES + 1):
+        with step.timer.phase("contact"):
+            changed = springs(step, h)
+            if passes > 1 and not changed:
+                renewals += 1
+                if renewals > FRICTION_RENEWALS or not contact.press(w, n, colliders, h, step.dt, weight):
+                    break
+                springs(step, h)
+        done = solve(passes)
+        report.iterations += done.iterations
+        report.residual = done.residual
+        report.converged &= done.converged
+        report.contact_passes = passes
+        if not colliders:
+            break
+    return done
+
+
+def springs(step: Step, h: float) -> int:
+    """Handles and contacts for the solution so far; how many contacts changed."""
+    w, counts = step.w, step.counts
+    holding.clear_springs(w, counts.nodes)
+    holding.pull(w, counts.pulled, h)
+    return contact.touch(w, counts.nodes, counts.colliders, h, step.dt) if counts.colliders else 0
+
+
+def friction(step: Step, h: float) -> None:
+    """At the end of a step: what sticks, and by how much its springs are stretched."""
+    with step.timer.phase("contact"):
+        if step.counts.colliders:
+            contact.slide(step.w, step.counts.nodes, step.counts.colliders, h, step.dt)

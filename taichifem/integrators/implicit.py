@@ -1,0 +1,179 @@
+"""The core of all implicit methods: M (v1 - base_v) = h (f(x1) + f_ext - C v1) with x1 = base_x + h v1.
+
+Backward Euler, BDF2 and the trapezoidal rule differ in the base and in h alone. The unknown is dv, the change of the
+velocity guess v. Linearised about positions x,
+
+    (M + h alpha M + (h^2 + h beta) K) dv
+        = M (base_v - v) + h (f_el(x) - K (base_x + h v - x) + f_ext - alpha M v - beta K v)
+
+The first linearisation is about the start of the step, the further ones (Newton's method) about x = base_x + h v.
+Without inertia the terms with M and the damping go, and what is left is a static problem.
+"""
+
+from dataclasses import replace
+
+import numpy as np
+
+from taichifem import elements
+from taichifem.integrators.constraints import friction, settle, springs
+from taichifem.integrators.step import Iteration, Step, StepReport
+from taichifem.linear_algebra import assembly, pcg
+from taichifem.processes import holding
+from taichifem.runtime import ti
+
+OVERSHOOT = 0.9
+"""Newton's correction is cut short where the imbalance along it has turned round and kept this part of its size."""
+
+CUTS = 8
+
+ALWAYS = 1e30
+"""A weight so large that residuals are measured against impulses alone, as befits a static problem."""
+
+
+@ti.kernel
+def start(w: ti.template(), n: ti.i32):
+    """Remember where the step begins, and go on from there: the base of backward Euler."""
+    for i in range(n):
+        w.x0[i] = w.x[i]
+        w.v0[i] = w.v[i]
+        w.base_x[i] = w.x[i]
+        w.base_v[i] = w.v[i]
+
+
+@ti.kernel
+def go_back(w: ti.template(), n: ti.i32):
+    """Undo a step that failed."""
+    for i in range(n):
+        w.x[i] = w.x0[i]
+        w.v[i] = w.v0[i]
+        w.dv[i] = ti.Vector.zero(w.real, 3)
+
+
+@ti.kernel
+def _load(w: ti.template(), n: ti.i32, h: ti.f64, inertia: ti.f64, gravity: ti.types.vector(3, ti.f64)):
+    """Right-hand side of the step without contact and handles."""
+    for i in range(n):
+        step, share = ti.cast(h, w.real), ti.cast(inertia, w.real)
+        w.force[i] = elements.gathered_force(w, i)
+        change = share * w.mass[i] * (w.base_v[i] - w.v[i])
+        outside = w.mass[i] * ti.cast(gravity, w.real) + w.outside[i] - share * w.drag[i] * w.v[i]
+        w.load[i] = change + step * (w.force[i] + outside)
+
+
+@ti.kernel
+def _forget(w: ti.template(), n: ti.i32):
+    for i in range(n):
+        w.dv[i] = ti.Vector.zero(w.real, 3)
+
+
+@ti.kernel
+def _update(w: ti.template(), n: ti.i32, h: ti.f64):
+    for i in range(n):
+        w.v[i] += w.dv[i]
+        w.x[i] = w.base_x[i] + ti.cast(h, w.real) * w.v[i]
+        w.direction[i] = w.free[i] * w.dv[i]
+
+
+@ti.kernel
+def _shorten(w: ti.template(), n: ti.i32, h: ti.f64, back: ti.f64):
+    """Take back the part `back` of the last correction."""
+    for i in range(n):
+        w.v[i] -= ti.cast(back, w.real) * w.direction[i]
+        w.x[i] = w.base_x[i] + ti.cast(h, w.real) * w.v[i]
+
+
+@ti.kernel
+def _slope(w: ti.template(), n: ti.i32) -> ti.f64:
+    """How much imbalance is left along the last correction: minus the slope of the energy, where there is one."""
+    total = ti.cast(0.0, ti.f64)
+    ti.loop_config(serialize=True)
+    for i in range(n):
+        total += ti.cast(w.direction[i].dot(w.load[i] + w.spring_load[i]), ti.f64)
+    return total
+
+
+@ti.kernel
+def _at_work(w: ti.template(), n: ti.i32, h: ti.f64) -> ti.f64:
+    """Size of the impulses of the elastic forces, those on held nodes included."""
+    total = ti.cast(0.0, ti.f64)
+    ti.loop_config(serialize=True)
+    for i in range(n):
+        total += ti.cast(w.force[i].norm_sqr(), ti.f64)
+    return h * ti.sqrt(total)
+
+
+def solve(step: Step, *, h: float, newton: int, inertia: bool = True) -> StepReport:
+    """Find the end of the step: `w.x` and `w.v`, from `w.x0`, `w.v`, `w.base_x` and `w.base_v`.
+
+    `w.dv` starts from the last step's, which is close when motion is smooth.
+    newton: most linearisations; 1 is the linearly implicit method.
+    """
+    w, n = step.w, step.counts.nodes
+    counts = step.counts if inertia else replace(step.counts, bodies=0)
+    weight = float(np.linalg.norm(step.gravity)) * h if inertia else ALWAYS
+    noise = float(np.finfo(np.float32 if w.precision == "f32" else np.float64).eps) / h
+    report, reference = StepReport(balanced=newton == 1), 0.0
+
+    def solve_linear(_: int) -> pcg.Convergence:
+        with step.timer.phase("solve"):
+            return pcg.solve(
+                w,
+                counts,
+                tolerance=step.options.tolerance,
+                max_iterations=step.options.max_iterations,
+                noise=noise,
+                weight=weight,
+                drag_factor=h * inertia,
+            )
+
+    _linearise(step, h, inertia, first=True)
+    for k in range(newton):
+        with step.timer.phase("assembly"):
+            assembly.assemble(w, counts.pairs, float(inertia), h * inertia)
+        done = settle(step, h, report, solve_linear, weight=weight / h if inertia else 0.0)
+        with step.timer.phase("update"):
+            _update(w, n, h)
+        report.linearisations = k + 1
+        reference = reference or done.load
+        if not inertia:
+            reference = max(reference, _at_work(w, n, h))
+        imbalance, length = done.load / max(reference, 1e-150), 1.0
+        if k > 0 and done.load <= max(step.options.newton_tolerance * reference, done.noise):
+            report.balanced = True
+        elif k + 1 < newton:
+            length = _linearise_and_search(step, h, inertia)
+        report.history.append(Iteration(imbalance, done.iterations, length))
+        if report.balanced:
+            break
+    friction(step, h)
+    return report
+
+
+def _linearise(step: Step, h: float, inertia: bool, *, first: bool) -> None:
+    """Forces, right-hand side and what the matrix needs."""
+    w, n, damped = step.w, step.counts.nodes, float(inertia)
+    with step.timer.phase("forces"):
+        if step.follow is not None:
+            step.follow()
+        rate = step.dt if first and inertia else 0.0
+        step.laws.deform(w, step.counts, stiffness=h * h, damping=h * damped, rate=rate, rate_damping=damped, keep=True)
+        _load(w, n, h, damped, step.gravity)
+        if not first:
+            _forget(w, n)
+        holding.hold(w, n, step.counts.held, step.dt, h)
+
+
+def _linearise_and_search(step: Step, h: float, inertia: bool) -> float:
+    """Linearise about the corrected state, and cut the correction where it overshoots; the part that stays."""
+    w, n = step.w, step.counts.nodes
+    before, length = _slope(w, n), 1.0
+    for _ in range(CUTS):
+        _linearise(step, h, inertia, first=False)
+        springs(step, h)
+        after = _slope(w, n)
+        if after >= -OVERSHOOT * abs(before):
+            break
+        shorter = length * min(0.5, max(0.1, before / (before - after)))
+        _shorten(w, n, h, length - shorter)
+        length = shorter
+    return length
