@@ -15,7 +15,7 @@ _HOME = {
         "PlaneCollider Pressure Scene SphereCollider SphereRegion Traction View"
     ),
     "taichifem.errors": "Diverged InputError",
-    "taichifem.mesh": "TetMesh",
+    "taichifem.mesh": "TetMesh TriMesh",
     "taichifem.scene": "preset",
     "taichifem.simulation": "Simulation",
 }

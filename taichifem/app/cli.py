@@ -97,25 +97,30 @@ def _run(ctx: click.Context, scene: Path, options: dict[str, Any]) -> None:
 @click.argument("source", metavar="IN")
 @click.option("-o", "--output", type=FILE, metavar="OUT", help="Where to write: .vtu, .vtk, .msh, .mesh, .inp ...")
 @click.option("--tets", type=click.IntRange(min=10), metavar="N", help="About how many tetrahedra fill a surface.")
-def mesh(source: str, output: Path | None, tets: int | None) -> None:
-    """Check, convert or make a tetrahedral mesh.
+@click.option("--planar", is_flag=True, help="Take IN for a flat mesh of triangles, for two-dimensional scenes.")
+def mesh(source: str, output: Path | None, tets: int | None, planar: bool) -> None:
+    """Check, convert or make a mesh of tetrahedra, or of triangles in the plane.
 
     Prints how good the mesh IN is, and writes it to OUT if that is given.
 
     IN is a volume mesh (.msh .vtk .vtu .mesh .inp .node .ele .veg), which is converted, or a closed surface
-    (.stl .obj .ply .glb), which is filled with tetrahedra.
+    (.stl .obj .ply .glb), which is filled with tetrahedra. With --planar it holds triangles (.msh .vtk .vtu .mesh
+    .inp .obj .stl .ply) in the x-z plane, or in the x-y plane, whose y then points up.
 
     \b
     Examples:
       taichifem mesh duck.ele
       taichifem mesh spot.obj --tets 5000 -o spot.vtu
+      taichifem mesh sheet.msh --planar -o sheet.vtu
     """
-    from taichifem.mesh import TetMesh, report
+    from taichifem.mesh import TetMesh, TriMesh, report
 
-    solid = TetMesh.from_file(source, tets=tets)
-    click.echo(report(solid))
+    if planar and tets is not None:
+        raise click.UsageError("--tets fills a surface with tetrahedra: leave it out with --planar")
+    body = TriMesh.from_file(source) if planar else TetMesh.from_file(source, tets=tets)
+    click.echo(report(body))
     if output is not None:
-        solid.write(output)
+        body.write(output)
         click.echo(f"wrote {output}")
 
 

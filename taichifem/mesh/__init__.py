@@ -1,8 +1,27 @@
-"""Tetrahedral meshes: shapes, files, checks and quality. NumPy only: nothing here starts Taichi."""
+"""Meshes of tetrahedra, and of triangles in the plane: shapes, files, checks and quality.
+
+NumPy only: nothing here starts Taichi.
+"""
 
 from taichifem.mesh.assets import asset_names, asset_path
-from taichifem.mesh.quality import Quality, quality, report
+from taichifem.mesh.kinds import Mesh, mesh_from_source
+from taichifem.mesh.quality import Quality, quality
+from taichifem.mesh.report import report
 from taichifem.mesh.tet_mesh import TetMesh
+from taichifem.mesh.tri_mesh import TriMesh
+from taichifem.mesh.tri_quality import TriQuality
 from taichifem.mesh.validation import Repairs
 
-__all__ = ["Quality", "Repairs", "TetMesh", "asset_names", "asset_path", "quality", "report"]
+__all__ = [
+    "Mesh",
+    "Quality",
+    "Repairs",
+    "TetMesh",
+    "TriMesh",
+    "TriQuality",
+    "asset_names",
+    "asset_path",
+    "mesh_from_source",
+    "quality",
+    "report",
+]

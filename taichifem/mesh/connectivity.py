@@ -1,44 +1,56 @@
-"""Who touches whom in a tetrahedral mesh: boundary faces, edges, pieces. Whole-array NumPy throughout."""
+"""Who touches whom in a mesh: boundary faces, edges, pieces. Whole-array NumPy throughout."""
 
 import numpy as np
 from scipy.sparse import coo_array
 from scipy.sparse.csgraph import connected_components
 
 from taichifem.errors import InputError
-from taichifem.mesh.validation import few
+from taichifem.mesh.validation import ELEMENTS, few
 
 # The face opposite each vertex of a positively oriented tetrahedron, seen counter-clockwise from outside.
 FACES = np.array([[1, 2, 3], [0, 3, 2], [0, 1, 3], [0, 2, 1]])
 EDGES = np.array([[0, 1], [0, 2], [0, 3], [1, 2], [1, 3], [2, 3]])
+# The edge opposite each vertex of a counter-clockwise triangle: whoever follows it has the triangle on the left.
+SIDES = np.array([[1, 2], [2, 0], [0, 1]])
 
 
 def boundary_faces(cells: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """The faces that belong to one tetrahedron only.
+    """The faces that belong to one tetrahedron only, or the edges that belong to one triangle only.
 
     Args:
-        cells: (m, 4) vertex indices, positively oriented.
+        cells: (m, 4) or (m, 3) vertex indices, positively oriented.
 
     Returns:
-        Triangles (k, 3) whose normals point outward, and the tetrahedron (k,) that each belongs to.
+        Triangles (k, 3) whose normals point outward, or edges (k, 2) with the body on their left; and the cell (k,)
+        that each belongs to.
 
     Raises:
-        InputError: a face belongs to more than two tetrahedra.
+        InputError: a face belongs to more than two cells.
     """
-    faces = cells[:, FACES].reshape(-1, 3)
+    corners = cells.shape[1]
+    faces = cells[:, FACES if corners == 4 else SIDES].reshape(-1, corners - 1)
     order, starts, counts = _groups(np.sort(faces, axis=1))
     if np.any(counts > 2):
         crowded = np.repeat(counts > 2, counts)
+        face = "a face" if corners == 4 else "an edge"
         raise InputError(
-            f"a face is shared by more than two tetrahedra, among them {few(np.unique(order[crowded] // 4))};"
-            " remove the overlapping elements"
+            f"{face} is shared by more than two {ELEMENTS[corners - 1]}, among them "
+            f"{few(np.unique(order[crowded] // corners))}; remove the overlapping elements"
         )
     single = np.sort(order[starts[counts == 1]])
-    return faces[single], single // 4
+    return faces[single], single // corners
+
+
+def overlapping(cells: np.ndarray) -> np.ndarray:
+    """Counter-clockwise triangles (m, 3) that lie on the same side of an edge as another one: their numbers."""
+    order, _, counts = _groups(cells[:, SIDES].reshape(-1, 2))
+    return np.unique(order[np.repeat(counts > 1, counts)] // 3)
 
 
 def edges(cells: np.ndarray) -> np.ndarray:
     """Every edge once: (e, 2) vertex indices, the smaller one first, in lexicographic order."""
-    pairs = np.sort(cells[:, EDGES].reshape(-1, 2), axis=1)
+    ends = EDGES if cells.shape[1] == 4 else SIDES
+    pairs = np.sort(cells[:, ends].reshape(-1, 2), axis=1)
     order, starts, _ = _groups(pairs)
     return pairs[order[starts]]
 
@@ -47,13 +59,13 @@ def pieces(cells: np.ndarray, point_count: int) -> tuple[int, np.ndarray]:
     """Connected pieces of a mesh in which touching means sharing a vertex.
 
     Args:
-        cells: (m, 4) vertex indices.
+        cells: (m, c) vertex indices of tetrahedra, triangles or edges.
         point_count: number n of points.
 
     Returns:
         The number of pieces, and for each point (n,) the number of its piece.
     """
-    heads, tails = np.repeat(cells[:, 0], 3), cells[:, 1:].reshape(-1)
+    heads, tails = np.repeat(cells[:, 0], cells.shape[1] - 1), cells[:, 1:].reshape(-1)
     links = coo_array((np.ones(len(heads), np.int8), (heads, tails)), shape=(point_count, point_count))
     return connected_components(links, directed=False)
 

@@ -5,13 +5,16 @@ from dataclasses import dataclass
 import numpy as np
 
 from taichifem.mesh.connectivity import EDGES, FACES, pieces
+from taichifem.mesh.kinds import Mesh
 from taichifem.mesh.tet_mesh import TetMesh
+from taichifem.mesh.tri_mesh import TriMesh
+from taichifem.mesh.tri_quality import TriQuality, tri_quality
 from taichifem.mesh.validation import Repairs
 
 
 @dataclass(frozen=True)
 class Quality:
-    """Measures of one mesh. Angles are dihedral angles in degrees; a regular tetrahedron has six of 70.53.
+    """Measures of a mesh of tetrahedra. Angles are dihedral angles in degrees; a regular tetrahedron has six of 70.53.
 
     Attributes:
         points, tets, triangles: counts; triangles are those of the surface.
@@ -39,8 +42,13 @@ class Quality:
     repairs: Repairs
 
 
-def quality(mesh: TetMesh) -> Quality:
-    """Measure a mesh; a million tetrahedra take a few seconds."""
+def quality(mesh: Mesh) -> Quality | TriQuality:
+    """Measure a mesh; a million elements take a few seconds."""
+    return tri_quality(mesh) if isinstance(mesh, TriMesh) else tet_quality(mesh)
+
+
+def tet_quality(mesh: TetMesh) -> Quality:
+    """Measure a mesh of tetrahedra."""
     angles = dihedral_angles(mesh)
     smallest, largest = angles.min(axis=1), angles.max(axis=1)
     ratios = radius_ratios(mesh)
@@ -77,35 +85,6 @@ def radius_ratios(mesh: TetMesh) -> np.ndarray:
     circumradius = np.sqrt(np.maximum((p + q + r) * (p + q - r) * (p - q + r) * (q + r - p), 0)) / (24 * volume)
     area = np.linalg.norm(_face_normals(mesh), axis=2).sum(axis=1) / 2
     return 9 * volume / (area * circumradius)
-
-
-def report(mesh: TetMesh) -> str:
-    """The measures of a mesh as text of several lines, for people."""
-    q = quality(mesh)
-    lines = [
-        ("points", f"{q.points:,}"),
-        ("tetrahedra", f"{q.tets:,}"),
-        ("surface triangles", f"{q.triangles:,}"),
-        ("pieces", f"{q.pieces}"),
-        ("size", " x ".join(f"{length:.4g}" for length in q.size) + " m"),
-        ("volume", f"{q.volume:.6g} m^3"),
-        ("smallest dihedral angle", f"{q.smallest_angle:.1f} deg worst, {q.mean_smallest_angle:.1f} mean"),
-        ("largest dihedral angle", f"{q.largest_angle:.1f} deg worst, {q.mean_largest_angle:.1f} mean"),
-        ("radius ratio", f"{q.worst_radius_ratio:.3f} worst, {q.mean_radius_ratio:.3f} mean (1 is regular)"),
-    ]
-    labels, counts = np.unique(mesh.regions, return_counts=True)
-    if len(labels) > 1:
-        shown = [f"{label} ({count:,})" for label, count in zip(labels[:8], counts, strict=False)]
-        lines.append(("regions", ", ".join(shown) + (", ..." if len(labels) > 8 else "")))
-    repairs = {
-        "elements flipped": q.repairs.flipped,
-        "unused points dropped": q.repairs.orphans,
-        "coincident points left": q.repairs.duplicates,
-    }
-    noticed = ", ".join(f"{count:,} {what}" for what, count in repairs.items() if count)
-    lines.append(("put right", noticed or "nothing"))
-    width = max(len(name) for name, _ in lines)
-    return "\n".join(f"{name:<{width}}  {value}" for name, value in lines)
 
 
 def _face_normals(mesh: TetMesh) -> np.ndarray:

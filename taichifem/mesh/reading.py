@@ -2,6 +2,7 @@
 
 import contextlib
 import io
+import warnings
 from collections.abc import Callable
 from dataclasses import dataclass
 from os import PathLike
@@ -49,32 +50,43 @@ def read(path: str | PathLike, surface_wanted: bool = False) -> Solid | Surface:
     Raises:
         InputError: no such file, unknown ending, unreadable content, or elements that are not tetrahedra.
     """
+    name, path = str(path), located(path)
+    suffix = path.suffix.lower()
+    try:
+        if suffix in SURFACE_SUFFIXES:
+            return _read_surface(path)
+        if suffix == ".veg":
+            return Solid(*attempt(read_veg, path))
+        if suffix in (".node", ".ele"):
+            return Solid(*attempt(read_tetgen, path))
+        if suffix not in meshio.extension_to_filetypes:
+            known = ".msh .vtk .vtu .mesh .inp .node .ele .veg .stl .obj .ply .glb"
+            raise InputError(f"has an ending that is not known; use one of {known}")
+        return _sort_cells(attempt(meshio.read, path), path, surface_wanted)
+    except InputError as error:
+        raise InputError(f"{name}: {error}") from None
+
+
+def located(path: str | PathLike) -> Path:
+    """The file that `path` or `asset:NAME` means.
+
+    Raises:
+        InputError: there is none.
+    """
     name = str(path)
     path = asset_path(name.removeprefix(PREFIX)) if name.startswith(PREFIX) else Path(path)
     if path.is_dir():
         raise InputError(f"{name}: is a folder; name a mesh file in it")
     if not path.exists():
         raise InputError(f"{name}: there is no such file; check the path")
-    suffix = path.suffix.lower()
-    try:
-        if suffix in SURFACE_SUFFIXES:
-            return _read_surface(path)
-        if suffix == ".veg":
-            return Solid(*_attempt(read_veg, path))
-        if suffix in (".node", ".ele"):
-            return Solid(*_attempt(read_tetgen, path))
-        if suffix not in meshio.extension_to_filetypes:
-            known = ".msh .vtk .vtu .mesh .inp .node .ele .veg .stl .obj .ply .glb"
-            raise InputError(f"has an ending that is not known; use one of {known}")
-        return _sort_cells(_attempt(meshio.read, path), path, surface_wanted)
-    except InputError as error:
-        raise InputError(f"{name}: {error}") from None
+    return path
 
 
-def _attempt(reader: Callable[[Path], Any], path: Path) -> Any:
+def attempt(reader: Callable[[Path], Any], path: Path) -> Any:
     """Run a reader in silence and turn whatever it does wrong into one line."""
     try:
-        with contextlib.redirect_stdout(io.StringIO()) as said, contextlib.redirect_stderr(said):
+        silence = contextlib.redirect_stdout(io.StringIO()), contextlib.redirect_stderr(io.StringIO())
+        with silence[0], silence[1], warnings.catch_warnings(action="ignore"):
             return reader(path)
     except InputError:
         raise
@@ -100,7 +112,7 @@ def _sort_cells(mesh: meshio.Mesh, path: Path, surface_wanted: bool) -> Solid | 
     points = np.asarray(mesh.points)
     blocks = [i for i, kind in enumerate(kinds) if kind == "tetra" and len(mesh.cells[i].data)]
     if blocks:
-        return Solid(points, np.concatenate([mesh.cells[i].data for i in blocks]), _regions(mesh, blocks))
+        return Solid(points, np.concatenate([mesh.cells[i].data for i in blocks]), region_labels(mesh, blocks))
     triangles = [block.data for block in mesh.cells if block.type == "triangle"]
     if triangles and surface_wanted:
         return Surface(points, np.concatenate(triangles))
@@ -109,8 +121,8 @@ def _sort_cells(mesh: meshio.Mesh, path: Path, surface_wanted: bool) -> Solid | 
     )
 
 
-def _regions(mesh: meshio.Mesh, blocks: list[int]) -> np.ndarray | None:
-    """One integer per tetrahedron from the first suitable cell data, or from sets of elements."""
+def region_labels(mesh: meshio.Mesh, blocks: list[int]) -> np.ndarray | None:
+    """One integer per element of `blocks` from the first suitable cell data, or from sets of elements."""
     others = [name for name in mesh.cell_data if name not in REGION_NAMES and name != "gmsh:geometrical"]
     for name in (*REGION_NAMES, *others, "gmsh:geometrical"):
         if name not in mesh.cell_data:
@@ -136,7 +148,7 @@ def _regions_from_sets(mesh: meshio.Mesh, blocks: list[int]) -> np.ndarray | Non
 
 
 def _read_surface(path: Path) -> Surface:
-    mesh = _attempt(lambda file: trimesh.load(file, force="mesh", process=False), path)
+    mesh = attempt(lambda file: trimesh.load(file, force="mesh", process=False), path)
     triangles = getattr(mesh, "faces", None)
     if triangles is None or len(triangles) == 0:
         raise InputError("holds no triangles; export a closed surface")

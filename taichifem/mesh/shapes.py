@@ -4,15 +4,13 @@ Every body of revolution is centred at the origin with its axis along z. It take
 elements across its radius or its wall; all other counts follow, so that elements are about as long as wide.
 """
 
-import inspect
 import itertools
-from numbers import Integral, Real
 
 import numpy as np
 
 from taichifem.errors import InputError
-
-Arrays = tuple[np.ndarray, np.ndarray]
+from taichifem.mesh.parameters import Arrays, each, grid_points, positive, whole
+from taichifem.mesh.shapes2d import unit_disk
 
 # Six Kuhn tetrahedra: from corner (0,0,0) to (1,1,1) along the axes in each of the six orders.
 KUHN_ORDERS = [(0, 1, 2), (1, 2, 0), (2, 0, 1), (0, 2, 1), (2, 1, 0), (1, 0, 2)]
@@ -33,14 +31,14 @@ def bar(size=(1.0, 0.25, 0.25), cells=(16, 4, 4), split: int = 5) -> Arrays:
     Raises:
         InputError: a size or a count is not positive, or split is neither 5 nor 6.
     """
-    size = np.array(_triple("size", size, _positive))
-    counts = np.array(_triple("cells", cells, _count))
+    size = np.array(each("size", size, positive))
+    counts = np.array(each("cells", cells, whole))
     if split not in (5, 6):
         raise InputError(f"split must be 5 or 6 tetrahedra per cube, not {split!r}")
-    grid = _grid(counts + 1)
+    grid = grid_points(counts + 1)
     stride = np.array([(counts[1] + 1) * (counts[2] + 1), counts[2] + 1, 1])
-    cubes = _grid(counts)
-    corners = _kuhn() if split == 6 else _grid(np.array([2, 2, 2]))[FIVE]
+    cubes = grid_points(counts)
+    corners = _kuhn() if split == 6 else grid_points(np.array([2, 2, 2]))[FIVE]
     tets = np.repeat(corners[None], len(cubes), axis=0)  # (cubes, tets, 4, 3)
     if split == 5:
         odd = cubes.sum(axis=1) % 2 == 1
@@ -55,8 +53,8 @@ def cylinder(radius: float = 0.25, height: float = 1.0, resolution: int = 3) -> 
     Raises:
         InputError: a length or the resolution is not positive.
     """
-    _positive("radius", radius), _positive("height", height), _count("resolution", resolution)
-    points, triangles = _disc(resolution)
+    positive("radius", radius), positive("height", height), whole("resolution", resolution)
+    points, triangles = unit_disk(resolution)
     layers = max(1, round(height / radius * resolution))
     levels = np.linspace(-height / 2, height / 2, layers + 1)
     stacked = np.array([np.column_stack([radius * points, np.full(len(points), z)]) for z in levels])
@@ -71,8 +69,8 @@ def hollow_cylinder(
     Raises:
         InputError: a length or the resolution is not positive, or the inner radius is not the smaller one.
     """
-    _positive("inner_radius", inner_radius), _positive("outer_radius", outer_radius)
-    _positive("height", height), _count("resolution", resolution)
+    positive("inner_radius", inner_radius), positive("outer_radius", outer_radius)
+    positive("height", height), whole("resolution", resolution)
     if inner_radius >= outer_radius:
         raise InputError(f"inner_radius {inner_radius} must be smaller than outer_radius {outer_radius}")
     length = (outer_radius - inner_radius) / resolution
@@ -95,7 +93,7 @@ def sphere(radius: float = 0.5, resolution: int = 5) -> Arrays:
     Raises:
         InputError: the radius or the resolution is not positive.
     """
-    _positive("radius", radius), _count("resolution", resolution)
+    positive("radius", radius), whole("resolution", resolution)
     corners, faces = _icosahedron()
     grid, tets = _simplex(resolution)
     weights = np.column_stack([grid[:, 0] - grid[:, 1], grid[:, 1] - grid[:, 2], grid[:, 2]]) / resolution
@@ -119,11 +117,11 @@ def torus(major_radius: float = 0.35, minor_radius: float = 0.15, resolution: in
     Raises:
         InputError: a radius or the resolution is not positive, or the tube is wider than the ring.
     """
-    _positive("major_radius", major_radius), _positive("minor_radius", minor_radius)
-    _count("resolution", resolution)
+    positive("major_radius", major_radius), positive("minor_radius", minor_radius)
+    whole("resolution", resolution)
     if minor_radius >= major_radius:
         raise InputError(f"minor_radius {minor_radius} must be smaller than major_radius {major_radius}")
-    disc, triangles = _disc(resolution)
+    disc, triangles = unit_disk(resolution)
     around = max(8, round(2 * np.pi * major_radius / minor_radius * resolution))
     angles = np.arange(around)[:, None] * (2 * np.pi / around)
     distance = major_radius + minor_radius * disc[:, 0]
@@ -132,48 +130,6 @@ def torus(major_radius: float = 0.35, minor_radius: float = 0.15, resolution: in
 
 
 SHAPES = {f.__name__: f for f in (bar, cylinder, hollow_cylinder, sphere, torus)}
-
-
-def make(shape: str, parameters: dict) -> tuple[np.ndarray, np.ndarray, dict]:
-    """Points, cells and the complete description of one of `SHAPES`.
-
-    Raises:
-        InputError: an unknown or a wrong parameter; the message names it.
-    """
-    function = SHAPES[shape]
-    known = inspect.signature(function).parameters
-    unknown = [name for name in parameters if name not in known]
-    if unknown:
-        raise InputError(f"shape {shape!r} has no parameter {unknown[0]!r}; it has {', '.join(known)}")
-    try:
-        points, cells = function(**parameters)
-    except InputError as error:
-        raise InputError(f"shape {shape!r}: {error}") from None
-    values = {name: parameters.get(name, known[name].default) for name in known}
-    plain = {name: np.asarray(value).tolist() for name, value in values.items()}
-    return points, cells, {"shape": shape, **plain}
-
-
-def _positive(name: str, value) -> float:
-    if isinstance(value, bool) or not isinstance(value, Real) or not 0 < value < np.inf:
-        raise InputError(f"{name} must be a positive length in metres, not {value!r}")
-    return float(value)
-
-
-def _count(name: str, value) -> int:
-    if isinstance(value, bool) or not isinstance(value, Integral) or value < 1:
-        raise InputError(f"{name} must be a whole number of at least 1, not {value!r}")
-    return int(value)
-
-
-def _triple(name: str, values, check) -> list:
-    if isinstance(values, str) or not hasattr(values, "__len__") or len(values) != 3:
-        raise InputError(f"{name} must be three numbers, for x, y and z, not {values!r}")
-    return [check(f"{name}[{i}]", value) for i, value in enumerate(values)]
-
-
-def _grid(counts: np.ndarray) -> np.ndarray:
-    return np.stack(np.meshgrid(*map(np.arange, counts), indexing="ij"), axis=-1).reshape(-1, 3)
 
 
 def _kuhn() -> np.ndarray:
@@ -187,23 +143,6 @@ def _oriented(points: np.ndarray, tets: np.ndarray) -> np.ndarray:
     mirrored = np.einsum("ij,ij->i", np.cross(b - a, c - a), d - a) < 0
     tets[mirrored] = tets[mirrored][:, [0, 2, 1, 3]]
     return tets
-
-
-def _disc(rings: int) -> Arrays:
-    """The unit disc in rings of 6, 12, 18, ... points: points (n, 2), counter-clockwise triangles."""
-    points, triangles = [np.zeros((1, 2))], []
-    inner, outer = 0, 1  # first point of the previous ring and of this one
-    for ring in range(1, rings + 1):
-        angles = np.arange(6 * ring) * (np.pi / (3 * ring))
-        points.append(np.column_stack([np.cos(angles), np.sin(angles)]) * ring / rings)
-        for sector, step in itertools.product(range(6), range(ring)):
-            a, b = (outer + (sector * ring + step + s) % (6 * ring) for s in (0, 1))
-            p, q = (inner + (sector * (ring - 1) + step + s) % max(1, 6 * (ring - 1)) for s in (0, 1))
-            triangles.append((a, b, p))
-            if step < ring - 1:
-                triangles.append((p, b, q))
-        inner, outer = outer, outer + 6 * ring
-    return np.concatenate(points), np.array(triangles)
 
 
 def _swept(sections: np.ndarray, triangles: np.ndarray, closed: bool) -> Arrays:
@@ -227,7 +166,7 @@ def _swept(sections: np.ndarray, triangles: np.ndarray, closed: bool) -> Arrays:
 
 def _simplex(n: int) -> Arrays:
     """The n^3 Kuhn tetrahedra of the grid inside n >= x >= y >= z >= 0: integer points (p, 3) and cells."""
-    cubes = _grid(np.array([n, n, n]))
+    cubes = grid_points(np.array([n, n, n]))
     tets = (cubes[:, None, None] + _kuhn()).reshape(-1, 4, 3)
     inside = (tets[..., 0] >= tets[..., 1]) & (tets[..., 1] >= tets[..., 2])
     tets = tets[inside.all(axis=1)]

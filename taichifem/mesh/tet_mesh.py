@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import replace
 from functools import cached_property
 from os import PathLike
 
@@ -12,10 +11,11 @@ import numpy as np
 from taichifem.errors import InputError
 from taichifem.mesh import implicit, reading, shapes, tetrahedralize, writing
 from taichifem.mesh.connectivity import boundary_faces
-from taichifem.mesh.validation import signed_volumes, validate
+from taichifem.mesh.simplex_mesh import SimplexMesh, check_file_source
+from taichifem.mesh.validation import signed_sizes
 
 
-class TetMesh:
+class TetMesh(SimplexMesh):
     """Points and positively oriented tetrahedra; the arrays are read-only.
 
     Attributes:
@@ -27,34 +27,17 @@ class TetMesh:
         repairs: what validation put right.
     """
 
-    def __init__(self, points, cells, regions=None, source: dict | None = None) -> None:
-        """Check the arrays, orient the tetrahedra and drop points that no tetrahedron uses.
-
-        Raises:
-            InputError: the arrays are no mesh: wrong shapes, values that are not finite, indices out of
-                range, elements without volume.
-        """
-        self.points, self.cells, self.regions, self.repairs = validate(points, cells, regions)
-        self.source = source
-        for array in (self.points, self.cells, self.regions):
-            array.flags.writeable = False
-
-    def __repr__(self) -> str:
-        return f"TetMesh({len(self.points)} points, {len(self.cells)} tetrahedra, source={self.source})"
+    dimension = 3
+    SHAPES = shapes.SHAPES
 
     def volumes(self) -> np.ndarray:
         """Volume (m,) of each tetrahedron [m^3], all positive."""
-        return signed_volumes(self.points, self.cells)
+        return signed_sizes(self.points, self.cells)
 
     @property
     def volume(self) -> float:
         """Volume of the whole mesh [m^3]."""
         return float(self.volumes().sum())
-
-    @property
-    def bounds(self) -> np.ndarray:
-        """Lowest and highest corner of the bounding box, (2, 3) [m]."""
-        return np.array([self.points.min(axis=0), self.points.max(axis=0)])
 
     def surface(self) -> np.ndarray:
         """Boundary triangles (k, 3), their normals pointing outward; computed once.
@@ -69,36 +52,6 @@ class TetMesh:
         triangles, _ = boundary_faces(self.cells)
         triangles.flags.writeable = False
         return triangles
-
-    def transformed(self, scale=1.0, rotation=None, translation=(0.0, 0.0, 0.0)) -> TetMesh:
-        """A copy that is scaled, then rotated, then moved.
-
-        Args:
-            scale: positive factor, or one per axis (3,).
-            rotation: (3, 3) rotation matrix applied to column vectors, or None.
-            translation: (3,) shift [m].
-
-        Raises:
-            InputError: an argument has a wrong shape, is not finite, or is no scale or rotation.
-        """
-        rotation = np.eye(3) if rotation is None else rotation
-        scale, rotation, translation = (
-            _finite(name, value, shape)
-            for name, value, shape in (
-                ("scale", scale, ((), (3,))),
-                ("rotation", rotation, ((3, 3),)),
-                ("translation", translation, ((3,),)),
-            )
-        )
-        if np.any(scale <= 0):
-            raise InputError(f"scale must be positive, not {scale.tolist()}")
-        if not np.allclose(rotation @ rotation.T, np.eye(3), atol=1e-6) or np.linalg.det(rotation) < 0:
-            raise InputError("rotation must be a 3x3 rotation matrix: orthogonal, with determinant +1")
-        step = {"scale": scale.tolist(), "rotation": rotation.tolist(), "translation": translation.tolist()}
-        source = self.source and {**self.source, "transforms": [*self.source.get("transforms", []), step]}
-        mesh = TetMesh((self.points * scale) @ rotation.T + translation, self.cells, self.regions, source)
-        mesh.repairs = replace(mesh.repairs, flipped=self.repairs.flipped, orphans=self.repairs.orphans)
-        return mesh
 
     def write(self, path: str | PathLike) -> None:
         """Write points, tetrahedra and regions in the format that the file's ending names.
@@ -183,42 +136,6 @@ class TetMesh:
         return cls._shape("torus", major_radius=major_radius, minor_radius=minor_radius, resolution=resolution)
 
     @classmethod
-    def from_source(cls, source: dict) -> TetMesh:
-        """Make again the mesh whose `source` this is.
-
-        Raises:
-            InputError: the shape or one of its parameters is unknown or wrong, or the file cannot be read.
-        """
-        source = dict(source)
-        transforms = source.pop("transforms", [])
-        mesh = cls._shape(source.pop("shape"), **source) if "shape" in source else cls._file(**source)
-        for step in transforms:
-            mesh = mesh.transformed(**step)
-        return mesh
-
-    @classmethod
     def _file(cls, file: str | None = None, tets: int | None = None, **unknown) -> TetMesh:
-        if file is None or unknown:
-            raise InputError(f"a mesh needs a 'shape' or a 'file'{_not(unknown)}")
+        check_file_source(file, unknown)
         return cls.from_file(file, tets)
-
-    @classmethod
-    def _shape(cls, shape: str, **parameters) -> TetMesh:
-        if shape not in shapes.SHAPES:
-            raise InputError(f"unknown shape {shape!r}; choose from {', '.join(shapes.SHAPES)}")
-        points, cells, source = shapes.make(shape, parameters)
-        return cls(points, cells, source=source)
-
-
-def _not(unknown: dict) -> str:
-    return f", and knows no {', '.join(map(repr, unknown))}" if unknown else ""
-
-
-def _finite(name: str, value, shapes_allowed: tuple) -> np.ndarray:
-    try:
-        value = np.asarray(value, dtype=float)
-    except (TypeError, ValueError):
-        raise InputError(f"{name} must be made of numbers, not {value!r}") from None
-    if value.shape not in shapes_allowed or not np.isfinite(value).all():
-        raise InputError(f"{name} must be finite numbers of shape {' or '.join(map(str, shapes_allowed))}")
-    return value

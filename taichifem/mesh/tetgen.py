@@ -1,4 +1,4 @@
-"""TetGen's pair of text files: `.node` with points and `.ele` with tetrahedra."""
+"""The pair of text files of TetGen and Triangle: `.node` with points, `.ele` with tetrahedra or triangles."""
 
 from pathlib import Path
 
@@ -7,11 +7,12 @@ import numpy as np
 from taichifem.errors import InputError
 
 
-def read_tetgen(path: Path) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Points (n, 3), cells (m, 4) from 0, and regions (m,) from the first attribute of the elements.
+def read_tetgen(path: Path, dimension: int = 3) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Points (n, d), cells (m, d + 1) from 0, and regions (m,) from the first attribute of the elements.
 
     Args:
         path: either file of the pair.
+        dimension: d, 3 for tetrahedra and 2 for triangles.
 
     Raises:
         InputError: the other file is missing, or the text is not what the format says.
@@ -20,12 +21,15 @@ def read_tetgen(path: Path) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     for file in (node, ele):
         if not file.is_file():
             raise InputError(f"needs {file.name} beside it, and it is not there")
-    (_, dimension, *_), points = _rows(node, float)
+    (_, axes, *_), points = _rows(node, float)
     (_, corners, *_), cells = _rows(ele, float)
-    if dimension != 3 or corners != 4:
-        raise InputError(f"has {dimension}-dimensional points and {corners}-node elements; 3 and 4 are needed")
-    regions = cells[:, 5] if cells.shape[1] > 5 else np.zeros(len(cells))
-    return points[:, 1:4], cells[:, 1:5].astype(np.int64) - int(points[0, 0]), regions.astype(np.int32)
+    if (axes, corners) != (dimension, dimension + 1):
+        raise InputError(
+            f"has {axes}-dimensional points and {corners}-node elements; {dimension} and {dimension + 1} are needed"
+        )
+    numbers, attribute = cells[:, 1 : corners + 1].astype(np.int64) - int(points[0, 0]), corners + 1
+    regions = cells[:, attribute] if cells.shape[1] > attribute else np.zeros(len(cells))
+    return points[:, 1 : dimension + 1], numbers, regions.astype(np.int32)
 
 
 def _rows(file: Path, number: type) -> tuple[list[int], np.ndarray]:

@@ -11,8 +11,8 @@ from typing import Any, Union, get_args, get_origin
 
 from taichifem.description import Collider, Material, Pin, Region, Scene
 from taichifem.errors import InputError
-from taichifem.mesh import TetMesh
-from taichifem.mesh.shapes import SHAPES
+from taichifem.mesh import Mesh, TetMesh, mesh_from_source
+from taichifem.mesh.kinds import SHAPES, kind_of
 from taichifem.scene import plain, presets
 from taichifem.scene.errors import KeyProblem, at, join, unknown_key, wrong
 from taichifem.scene.layout import COLLIDERS, REGIONS, SIMULATION, hints, holds_dataclass, keys
@@ -61,7 +61,7 @@ class _Builder:
     def value(self, hint: Any, raw: object, path: str) -> Any:
         """`raw` as the type `hint` wants it."""
         origin, args = get_origin(hint), get_args(hint)
-        special = {Material: self.material, TetMesh: self.mesh, Collider: self.collider}
+        special = {Material: self.material, TetMesh: self.mesh, Mesh: self.mesh, Collider: self.collider}
         if hint in special:
             return special[hint](raw, path)
         if hint in plain.READERS:
@@ -113,29 +113,29 @@ class _Builder:
             raise KeyProblem(where, f"{where}: {error}") from None
         return self.table(Material, raw, path, **{name: getattr(base, name) for name in hints(Material)})
 
-    def mesh(self, raw: object, path: str) -> TetMesh:
-        """A shape with its parameters, or a file. TetMesh itself checks the values."""
+    def mesh(self, raw: object, path: str) -> Mesh:
+        """A shape with its parameters, or a file, which may be planar. The mesh itself checks the values."""
         raw = dict(plain.table(raw, path))
         if ("shape" in raw) == ("file" in raw):
             raise KeyProblem(path, f"{path}: give either a shape ({', '.join(SHAPES)}) or a file")
-        first = "shape" if "shape" in raw else "file"
-        if first == "shape":
-            maker = SHAPES[_choice(raw["shape"], join(path, "shape"), SHAPES)]
+        if "shape" in raw:
+            first, maker = ["shape"], SHAPES[_choice(raw["shape"], join(path, "shape"), SHAPES)]
         else:
-            maker = TetMesh.from_file
+            plain.flag(raw.get("planar", False), join(path, "planar"))
+            first, maker = ["file", "planar"], kind_of(raw).from_file
             name = plain.text(raw["file"], join(path, "file"))
             raw["file"] = name if name.startswith("asset:") else str(self.folder / name)
             if plain.whole(raw.get("tets", 1), join(path, "tets")) < 1:
                 raise wrong(join(path, "tets"), "at least 1", raw["tets"])
-        known = [first, *(name for name in inspect.signature(maker).parameters if name != "path")]
+        known = [*first, *(name for name in inspect.signature(maker).parameters if name != "path")]
         for key in raw:
             if key not in known:
                 raise unknown_key(path, key, known)
         try:
-            return TetMesh.from_source(raw)
+            return mesh_from_source(raw)
         except InputError as error:
             message = str(error).removeprefix(f"shape {raw.get('shape')!r}: ")
-            raise _placed(message, path, {key: key for key in raw if first == "shape"}) from None
+            raise _placed(message, path, {key: key for key in raw if "shape" in raw}) from None
         except (MemoryError, OverflowError, ValueError) as error:  # numbers that NumPy cannot hold
             raise KeyProblem(
                 path, f"{path} cannot be made: {error or 'out of memory'}: ask for fewer elements"
