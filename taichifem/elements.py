@@ -26,18 +26,20 @@ def seen(v, w: ti.template()):
 @ti.func
 def lifted(f, w: ti.template()):
     """The node vector (3,) of what an element says (d,): the inverse of `seen`, zero across the plane."""
-    return f if ti.static(w.d == 3) else ti.Vector([f[0], 0.0 * f[0], f[1]])
+    if ti.static(w.d == 3):
+        return f
+    else:
+        return ti.Vector([f[0], 0.0 * f[0], f[1]])
 
 
 @ti.func
 def lifted_matrix(m, w: ti.template()):
     """The (3,3) matrix of an element's (d,d), zero across the plane."""
-    zero = 0.0 * m[0, 0]
-    return (
-        m
-        if ti.static(w.d == 3)
-        else ti.Matrix([[m[0, 0], zero, m[0, 1]], [zero, zero, zero], [m[1, 0], zero, m[1, 1]]])
-    )
+    if ti.static(w.d == 3):
+        return m
+    else:
+        zero = 0.0 * m[0, 0]
+        return ti.Matrix([[m[0, 0], zero, m[0, 1]], [zero, zero, zero], [m[1, 0], zero, m[1, 1]]])
 
 
 @ti.func

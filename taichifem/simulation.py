@@ -24,6 +24,10 @@ PAST = ("past_x", "past_v")
 """Fields of integrators that look further back."""
 
 
+STATIC_TOLERANCE, STATIC_ITERATIONS = 1e-6, 50_000
+"""Of the linear solver in a static solve: the stiffness matrix alone is far worse conditioned than a step's."""
+
+
 class Simulation(Bodies):
     """The state of a scene over time. Arrays in and out are NumPy, float64, SI units; z points up.
 
@@ -131,6 +135,28 @@ class Simulation(Bodies):
         end = self.time + seconds
         while self.time + 0.5 * self.dt < end:
             self.step()
+
+    def balance(self, *, share: float = 1.0, tolerance: float = 1e-9, max_newton: int = 30) -> StepReport:
+        """Find the balance under the part `share` of gravity, loads and motions; for "quasi-static" scenes.
+
+        Loads are taken at their full size, motions as far on their way to the last key time.  The report says whether
+        it was found (`balanced`); `taichifem.statics.solve_static` puts loads on in steps where it was not.
+        tolerance: imbalance relative to the forces at work.  max_newton: most linearisations.
+        """
+        if self.scene.integrator != "quasi-static":
+            raise InputError(f'integrator is {self.scene.integrator!r}: only "quasi-static" scenes can be balanced')
+        self._timer.reset()
+        with self._timer.phase("set-up"):
+            self._surround(share * self._surroundings.last_key, self.dt, all_act=True)
+            self._send_loads(lambda _: share)
+        self._advance(
+            share * np.asarray(self.scene.gravity, dtype=float),
+            tolerance=STATIC_TOLERANCE,
+            max_iterations=max(STATIC_ITERATIONS, self.scene.max_iterations),
+            newton=max_newton,
+            newton_tolerance=tolerance,
+        )
+        return self._report
 
     def _keep_stable(self) -> None:
         """Choose the steps a frame of an explicit method, or refuse those the scene asks for."""

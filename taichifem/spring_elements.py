@@ -17,7 +17,7 @@ def _youngs(row):
 
 
 @ti.func
-def _spring(w: ti.template(), e: ti.i32, a: ti.i32, b: ti.i32, number: ti.i32):
+def _spring(w: ti.template(), e: ti.i32, a: ti.template(), b: ti.template(), number: ti.template()):
     """Length at rest and now [m], direction from a to b, and stiffness [N/m] of spring `number`, corners a and b."""
     row = w.table[w.material[e]]
     i, j = w.cell[e][a], w.cell[e][b]

@@ -15,7 +15,7 @@ from taichifem.description.motion import Motion, rotation_matrix
 from taichifem.description.regions import Region
 from taichifem.description.view import Camera, View
 from taichifem.errors import InputError
-from taichifem.mesh import TetMesh
+from taichifem.mesh import Mesh
 
 INTEGRATORS = ("backward-euler", "backward-euler-newton", "bdf2", "newmark", "symplectic-euler", "quasi-static")
 
@@ -74,7 +74,7 @@ class Body:
     be turned about y only.
     """
 
-    mesh: TetMesh
+    mesh: Mesh
     material: Material = field(default_factory=Material)
     materials: Mapping[int, Material] = field(default_factory=dict)
     name: str = ""

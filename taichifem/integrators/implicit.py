@@ -8,6 +8,10 @@ velocity guess v. Linearised about positions x,
 
 The first linearisation is about the start of the step, the further ones (Newton's method) about x = base_x + h v.
 Without inertia the terms with M and the damping go, and what is left is a static problem.
+
+Far from the end the elements' tangents are projected to positive semi-definite, which always gives a direction that
+descends; near it they are exact, for then Newton's method converges quadratically. Where the exact matrix turns out
+to be indefinite, as before a body buckles, the projected one takes over again.
 """
 
 from dataclasses import replace
@@ -25,6 +29,9 @@ OVERSHOOT = 0.9
 """Newton's correction is cut short where the imbalance along it has turned round and kept this part of its size."""
 
 CUTS = 8
+
+NEAR = 0.1
+"""Imbalance, relative to the forces at work, below which tangents are exact."""
 
 ALWAYS = 1e30
 """A weight so large that residuals are measured against impulses alone, as befits a static problem."""
@@ -126,11 +133,19 @@ def solve(step: Step, *, h: float, newton: int, inertia: bool = True) -> StepRep
                 drag_factor=h * inertia,
             )
 
-    _linearise(step, h, inertia, first=True)
-    for k in range(newton):
+    def solve_step() -> pcg.Convergence:
         with step.timer.phase("assembly"):
             assembly.assemble(w, counts.pairs, float(inertia), h * inertia)
-        done = settle(step, h, report, solve_linear, weight=weight / h if inertia else 0.0)
+        return settle(step, h, report, solve_linear, weight=weight / h if inertia else 0.0)
+
+    exact = False
+    _linearise(step, h, inertia, first=True)
+    for k in range(newton):
+        done = solve_step()
+        if not done.definite:
+            exact = False
+            _linearise(step, h, inertia)
+            done = solve_step()
         with step.timer.phase("update"):
             _update(w, n, h)
         report.linearisations = k + 1
@@ -141,7 +156,8 @@ def solve(step: Step, *, h: float, newton: int, inertia: bool = True) -> StepRep
         if k > 0 and done.load <= max(step.options.newton_tolerance * reference, done.noise):
             report.balanced = True
         elif k + 1 < newton:
-            length = _linearise_and_search(step, h, inertia)
+            exact = exact or (imbalance < NEAR and k > 0)
+            length = _linearise_and_search(step, h, inertia, exact=exact)
         report.history.append(Iteration(imbalance, done.iterations, length))
         if report.balanced:
             break
@@ -149,26 +165,35 @@ def solve(step: Step, *, h: float, newton: int, inertia: bool = True) -> StepRep
     return report
 
 
-def _linearise(step: Step, h: float, inertia: bool, *, first: bool) -> None:
+def _linearise(step: Step, h: float, inertia: bool, *, first: bool = False, exact: bool = False) -> None:
     """Forces, right-hand side and what the matrix needs."""
     w, n, damped = step.w, step.counts.nodes, float(inertia)
     with step.timer.phase("forces"):
         if step.follow is not None:
             step.follow()
         rate = step.dt if first and inertia else 0.0
-        step.laws.deform(w, step.counts, stiffness=h * h, damping=h * damped, rate=rate, rate_damping=damped, keep=True)
+        step.laws.deform(
+            w,
+            step.counts,
+            stiffness=h * h,
+            damping=h * damped,
+            rate=rate,
+            rate_damping=damped,
+            projected=not exact,
+            keep=True,
+        )
         _load(w, n, h, damped, step.gravity)
         if not first:
             _forget(w, n)
         holding.hold(w, n, step.counts.held, step.dt, h)
 
 
-def _linearise_and_search(step: Step, h: float, inertia: bool) -> float:
+def _linearise_and_search(step: Step, h: float, inertia: bool, *, exact: bool) -> float:
     """Linearise about the corrected state, and cut the correction where it overshoots; the part that stays."""
     w, n = step.w, step.counts.nodes
     before, length = _slope(w, n), 1.0
     for _ in range(CUTS):
-        _linearise(step, h, inertia, first=False)
+        _linearise(step, h, inertia, exact=exact)
         springs(step, h)
         after = _slope(w, n)
         if after >= -OVERSHOOT * abs(before):

@@ -18,7 +18,7 @@ from taichifem.linear_algebra import balance, matrix
 from taichifem.runtime import ti
 from taichifem.world import CHUNKS, Counts, World
 
-RZ, RESIDUAL, DONE, COUNT, ALPHA, BETA, LOAD, NOISE, WEIGHT, SIZE = range(10)
+RZ, RESIDUAL, DONE, COUNT, ALPHA, BETA, LOAD, NOISE, WEIGHT, SIZE, INDEFINITE = range(11)
 CHECK_EVERY = 8
 
 
@@ -27,6 +27,7 @@ class Convergence:
     """What a solve did: iterations, relative residual reached, whether that met the tolerance.
 
     load: what the residual was measured against [N s].  noise: what rounding of the forces adds to it.
+    definite: False if the matrix turned out to have a negative eigenvalue, and the solve was given up.
     """
 
     iterations: int
@@ -34,6 +35,7 @@ class Convergence:
     converged: bool
     load: float
     noise: float
+    definite: bool = True
 
 
 @ti.kernel
@@ -126,6 +128,7 @@ def _begin(w: ti.template(), n: ti.i32, tolerance: ti.f64, noise: ti.f64, weight
         w.scalar[WEIGHT] = ti.sqrt(sums[6])
         w.scalar[DONE] = 0.0
         w.scalar[COUNT] = 0.0
+        w.scalar[INDEFINITE] = 0.0
         _judge(w, sums[1], sums[4], sums[5], tolerance)
 
 
@@ -147,6 +150,8 @@ def _iterate(w: ti.template(), n: ti.i32, tolerance: ti.f64):
         for c in range(CHUNKS):
             total += w.partial[c][0]
         w.scalar[ALPHA] = w.scalar[RZ] / total if total > 0 else 0.0
+        if total < 0 and w.scalar[DONE] == 0:
+            w.scalar[INDEFINITE] = 1.0
     ti.loop_config(block_dim=1)
     for c in range(CHUNKS):
         if w.scalar[DONE] == 0:
@@ -173,7 +178,7 @@ def _iterate(w: ti.template(), n: ti.i32, tolerance: ti.f64):
             w.scalar[RZ] = sums[0]
             w.scalar[COUNT] += 1
             _judge(w, sums[1], sums[2], sums[3], tolerance)
-            # alpha is zero only when rounding has taken the curvature: more iterations cannot help.
+            # alpha is zero where the matrix is indefinite, or rounding has taken the curvature: going on cannot help.
             if w.scalar[ALPHA] == 0:
                 w.scalar[DONE] = 1.0
     for i in range(n):
@@ -217,4 +222,5 @@ def solve(
         residual <= tolerance * (1 + 1e-12),
         float(w.scalar[SIZE]),
         float(w.scalar[NOISE]),
+        w.scalar[INDEFINITE] == 0,
     )

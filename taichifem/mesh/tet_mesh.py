@@ -47,6 +47,10 @@ class TetMesh(SimplexMesh):
         """
         return self._surface
 
+    def boundary(self) -> np.ndarray:
+        """Faces that loads act on: those of the surface (k, 3)."""
+        return self._surface
+
     @cached_property
     def _surface(self) -> np.ndarray:
         triangles, _ = boundary_faces(self.cells)

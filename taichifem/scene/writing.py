@@ -13,7 +13,7 @@ import tomli_w
 
 from taichifem.description import Pin, Scene
 from taichifem.files import replacing
-from taichifem.mesh import TetMesh
+from taichifem.mesh import Mesh
 from taichifem.scene.layout import COLLIDERS, REGIONS, SIMULATION, keys
 
 _REGION_KEYS = {cls: key for key, cls in REGIONS.items()}
@@ -61,7 +61,7 @@ class _Writer:
             value = getattr(thing, field.name)
             if type(value) in _REGION_KEYS:
                 found[_REGION_KEYS[type(value)]] = self.region(value)
-            elif isinstance(value, TetMesh):
+            elif isinstance(value, Mesh):
                 found[named[field.name]] = self.mesh(value)
             elif value is not None and (written := self.plain(value)) != self.plain(_default(field)):
                 found[named[field.name]] = written
@@ -88,10 +88,10 @@ class _Writer:
         table = self.table(region)
         return next(iter(table.values())) if len(dataclasses.fields(region)) == 1 else table
 
-    def mesh(self, mesh: TetMesh) -> dict:
+    def mesh(self, mesh: Mesh) -> dict:
         source = mesh.source
         if not source or "transforms" in source:
-            return {"file": self.save(mesh)}
+            return {"file": self.save(mesh)} | ({"planar": True} if mesh.dimension == 2 else {})
         return {key: self.file(value) if key == "file" else self.plain(value) for key, value in source.items()}
 
     def file(self, name: str) -> str:
@@ -101,7 +101,7 @@ class _Writer:
         full, folder = Path(name).resolve(), self.path.parent.resolve()
         return (full.relative_to(folder) if full.is_relative_to(folder) else full).as_posix()
 
-    def save(self, mesh: TetMesh) -> str:
+    def save(self, mesh: Mesh) -> str:
         if id(mesh) not in self.saved:
             name = f"{self.path.stem}.mesh-{len(self.saved)}.vtu"
             mesh.write(self.path.with_name(name))

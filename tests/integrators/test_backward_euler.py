@@ -71,7 +71,7 @@ def test_free_fall_is_exact_for_backward_euler(block):
     simulation = tf.Simulation(tf.Scene(bodies=[tf.Body(mesh=block)]), precision="f64")
     for _ in range(30):
         simulation.step()
-    dt, n = simulation.scene.dt, 30
+    dt, n = simulation.dt, 30
     drop = -9.81 * dt**2 * n * (n + 1) / 2
     np.testing.assert_allclose(simulation.positions - block.points, np.tile([0, 0, drop], (112, 1)), atol=1e-10)
 

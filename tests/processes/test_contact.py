@@ -49,7 +49,7 @@ def test_friction_stops_a_sliding_body_after_v2_over_2_mu_g():
     simulation.advance(seconds=1.0)
     assert simulation.stats.max_speed < 1e-3
     # Backward Euler falls short of v^2 / (2 mu g) by half a step's way.
-    expected = 1 / (2 * 0.3 * 9.81) - 0.5 * scene.dt
+    expected = 1 / (2 * 0.3 * 9.81) - 0.5 / scene.fps
     assert simulation.positions[:, 0].mean() - start == pytest.approx(expected, rel=0.01)
 
 
