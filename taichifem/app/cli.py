@@ -8,7 +8,7 @@ from typing import Any
 import click
 
 from taichifem import __version__
-from taichifem.app.options import FILE, MODELS, machine_options, run_options
+from taichifem.app.options import FILE, MODELS, compare_options, machine_options, run_options
 from taichifem.app.program import INTERRUPTED, Program
 
 EXAMPLES = """
@@ -18,6 +18,7 @@ Examples:
   taichifem demo hello                            writes out/hello.mp4
   taichifem run scene.toml -o fall.mp4 --seconds 3
   taichifem run scene.toml --set body.0.material.youngs=2e5 --color von-mises
+  taichifem compare twist --vary model=corotational,stvk --video laws.mp4
   taichifem mesh surface.obj -o solid.vtu --tets 5000
 """
 
@@ -90,6 +91,31 @@ def _run(ctx: click.Context, scene: Path, options: dict[str, Any]) -> None:
     from taichifem.app.run import RunOptions, run_scene
 
     if run_scene(scene, RunOptions(**options)).interrupted:
+        ctx.exit(INTERRUPTED)
+
+
+@cli.command()
+@click.argument("scene")
+@compare_options
+@click.pass_context
+def compare(ctx: click.Context, scene: str, **options: Any) -> None:
+    """Run a scene under several choices, side by side.
+
+    SCENE is a scene file or the name of a demo. Prints a table: time and iterations of a step, energy, stability.
+
+    The material's fields go into every body: model, youngs, poisson, density, mass_damping, stiffness_damping,
+    wraps, threshold. So do integrator, substeps, tolerance and the like into [simulation]. A model may say what
+    it wraps, as in invertible:stvk. A choice that diverges does not end the others.
+
+    \b
+    Examples:
+      taichifem compare twist --vary model=linear,corotational,stvk,neo-hookean --video laws.mp4
+      taichifem compare scene.toml --vary substeps=1,2,4 --seconds 1 --json figures.json
+      taichifem compare scene.toml --vary body.ball.material.youngs=1e5,1e6 --video stiffness.gif
+    """
+    from taichifem.app.compare import CompareOptions, run_compare
+
+    if run_compare(scene, CompareOptions(**options)).interrupted:
         ctx.exit(INTERRUPTED)
 
 

@@ -96,3 +96,36 @@ run_options = together(
     machine_options,
     click.option("-q", "--quiet", is_flag=True, help="Print nothing but errors."),
 )
+
+compare_options = together(
+    click.option(
+        "--vary",
+        required=True,
+        metavar="KEY=A,B,C",
+        help="What differs: a field of the material (of every body), a key of [simulation], or a key as in --set.",
+    ),
+    click.option(
+        "--video",
+        type=click.Path(path_type=str),
+        metavar="FILE",
+        help="All choices side by side: .mp4, .gif, .webp, or numbered .png.  [default: draw nothing]",
+    ),
+    click.option(
+        "--set",
+        "overrides",
+        multiple=True,
+        metavar="KEY=VALUE",
+        help="Change the scene for every choice, as in body.0.material.youngs=2e5. May be given again.",
+    ),
+    click.option(
+        "--seconds", type=float, metavar="T", help="Run until this simulated time [s].  [default: the scene's]"
+    ),
+    click.option(
+        "--fps", type=float, metavar="F", help="Frames a second; the time step follows.  [default: the scene's]"
+    ),
+    click.option(
+        "--size", type=Size(), metavar="WxH", default="1280x720", show_default=True, help="Of the picture [pixels]."
+    ),
+    click.option("--json", "json_file", type=FILE, metavar="FILE", help="Write all figures to this file, too."),
+    machine_options,
+)

@@ -42,6 +42,7 @@ class Frame:
     colors: (k,3) float32, sRGB in [0, 1], one per triangle (None: the first of the palette).
     values: (n,) float32 or None: shown by the colour map over value_range instead of `colors`.
     value_label: what the values are;  value_unit: their SI unit.
+    bar: write the colour map beside them.
     wire: draw the triangles' edges.  hud: lines of text, top left.
     """
 
@@ -52,6 +53,7 @@ class Frame:
     value_range: tuple[float, float] = (0.0, 1.0)
     value_label: str = ""
     value_unit: str = ""
+    bar: bool = True
     colliders: tuple[Shape, ...] = ()
     wire: bool = False
     hud: tuple[str, ...] = field(default=())

@@ -13,6 +13,7 @@ from taichifem.output.frame import Frame
 _INK = (38, 44, 54)
 _PAPER = (255, 255, 255)
 _PAPER_OPACITY = 150
+_SMALLEST = 9  # letters [pixels]
 
 _PREFIXES = ((1e9, "G"), (1e6, "M"), (1e3, "k"), (1.0, ""), (1e-3, "m"), (1e-6, "u"), (1e-9, "n"))
 
@@ -73,7 +74,7 @@ def _write(sprite: Image.Image, x: int, y: int, text: str, size: int, opacity: f
     sprite.alpha_composite(ink, (x, y))
 
 
-@functools.lru_cache(maxsize=8)
+@functools.lru_cache(maxsize=32)
 def _text_panel(lines: tuple[str, ...], size: int) -> np.ndarray:
     pad, pitch = int(0.7 * size), int(1.35 * size)
     widest = max(_line(line, size).width for line in lines)
@@ -120,14 +121,31 @@ def _blend(picture: np.ndarray, sprite: np.ndarray, x: int, y: int) -> None:
     part[:] = (mixed // 255).astype(np.uint8)
 
 
+def stamp(picture: np.ndarray, text: str, *, size: int, middle: tuple[float, float]) -> None:
+    """Write a line of text into `picture` (height,width,3) uint8, in place.
+
+    size: of the letters [pixels]; smaller ones are taken where the line is wider than the picture.
+    middle: of the line, as parts of the picture's width and height, 0 to 1; the line stays inside.
+    """
+    height, width = picture.shape[:2]
+    while size > _SMALLEST and _text_panel((text,), size).shape[1] > width:
+        size -= 1
+    sprite = _text_panel((text,), size)
+    x, y = (
+        round(min(max(0, part * room - side / 2), max(0, room - side)))
+        for part, room, side in zip(middle, (width, height), sprite.shape[1::-1], strict=True)
+    )
+    _blend(picture, sprite, x, y)
+
+
 def annotate(picture: np.ndarray, frame: Frame) -> np.ndarray:
     """Write the frame's text and colour bar into `picture` (height,width,3) uint8, in place."""
     height, width = picture.shape[:2]
-    size = int(np.clip(round(height / 42), 9, 40))
+    size = int(np.clip(round(min(height, 0.75 * width) / 42), _SMALLEST, 40))
     margin = size
     if frame.hud:
         _blend(picture, _text_panel(tuple(frame.hud), size), margin, margin)
-    if frame.values is not None:
+    if frame.values is not None and frame.bar:
         low, high = (float(f"{v:.4g}") for v in frame.value_range)
         if low < high:
             sprite = _bar_panel(low, high, frame.value_label, frame.value_unit, int(0.42 * height), size)

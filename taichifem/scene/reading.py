@@ -12,14 +12,16 @@ from taichifem.errors import InputError
 from taichifem.scene.building import build_scene
 from taichifem.scene.errors import KeyProblem
 from taichifem.scene.overrides import apply_override
+from taichifem.scene.short_keys import spelled_out
 
 
-def read_scene(path: str | PathLike, overrides: Iterable[str] = ()) -> Scene:
+def read_scene(path: str | PathLike, overrides: Iterable[str] = (), *, choice: str | None = None) -> Scene:
     """Read a scene from a TOML file.
 
     Args:
         path: the scene file; mesh files in it are looked for in its folder.
         overrides: settings such as "body.0.material.youngs=2e5", put in before anything is checked.
+        choice: one more, put in last, whose key may be short: "model=stvk" for all materials.
 
     Raises:
         InputError: one line with the file, the key path, what is wrong there and the remedy.
@@ -28,6 +30,8 @@ def read_scene(path: str | PathLike, overrides: Iterable[str] = ()) -> Scene:
     placed = []
     try:
         placed = [(apply_override(tree, text), text) for text in overrides]
+        if choice is not None:
+            placed += [(apply_override(tree, text), choice) for text in spelled_out(tree, choice)]
         return build_scene(tree, Path(path).parent)
     except KeyProblem as problem:
         guilty = [text for key, text in placed if f"{problem.path}.".startswith(f"{key}.")]
