@@ -25,7 +25,7 @@ class Run:
         self.diverged: float | None = None
         scene = simulation.scene
         self.frames = max(1, round(scene.seconds * scene.fps))
-        self._critical = getattr(simulation, "critical_step", lambda: math.nan)()  # TODO: simulation.critical_step()
+        self._critical = simulation.critical_step()
         self._ms: list[dict[str, float]] = []
         self._reports: list[tuple[int, float, bool]] = []
         self._energy = [self._energies()]

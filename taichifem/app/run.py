@@ -86,12 +86,23 @@ def run_scene(path: Path, options: RunOptions) -> Summary:
     simulation = Simulation(scene, precision=options.precision)
     if options.resume is not None:
         simulation.load(options.resume)
+    if scene.integrator == "symplectic-euler" and not options.quiet:
+        click.echo(explicit_steps(simulation))
     summary = _record(simulation, _frames_left(simulation, options), path.stem, options)
     if not options.quiet:
         click.echo(str(summary))
         for file in summary.files:
             click.echo(f"wrote {file}")
     return summary
+
+
+def explicit_steps(simulation: Simulation) -> str:
+    """What stability asks of an explicit simulation, in words."""
+    chosen = "as the scene says" if simulation.scene.substeps else "chosen for it"
+    return (
+        f"symplectic Euler: critical time step {1e3 * simulation.critical_step():.4g} ms; "
+        f"{simulation.substeps} steps a frame of {1e3 * simulation.dt:.4g} ms, {chosen}"
+    )
 
 
 def _frames_left(simulation: Simulation, options: RunOptions) -> int:

@@ -186,11 +186,13 @@ def hud_lines(simulation: Any) -> tuple[str, ...]:
     """What the picture says in words: time, size, cost."""
     stats = simulation.stats.as_dict()
     cost = stats.get("ms_per_step") or sum(stats.get("ms", {}).values())
+    elements = "triangles" if simulation.cells.shape[1] == 3 else "tetrahedra"
     lines = [
         simulation.scene.name,
         f"t = {simulation.time:.2f} s",
-        f"{stats.get('elements', 0):,} tetrahedra, {stats.get('nodes', 0):,} nodes",
+        f"{stats.get('elements', 0):,} {elements}, {stats.get('nodes', 0):,} nodes",
     ]
     if cost > 0:
-        lines.append(f"{cost:.1f} ms a step, {stats.get('iterations', 0)} iterations")
+        solver = f", {stats['iterations']} iterations" if stats.get("iterations") else ""
+        lines.append(f"{cost:.2g} ms a step{solver}" if cost < 1 else f"{cost:.1f} ms a step{solver}")
     return tuple(lines)
