@@ -8,8 +8,8 @@ from typing import Any
 import click
 
 from taichifem import __version__
-from taichifem.app.options import FILE, MODELS, compare_options, machine_options, run_options
-from taichifem.app.program import INTERRUPTED, Program
+from taichifem.app.options import FILE, MODELS, compare_options, machine_options, run_options, static_options
+from taichifem.app.program import INTERRUPTED, UNSOLVED, Program
 
 EXAMPLES = """
 \b
@@ -92,6 +92,29 @@ def _run(ctx: click.Context, scene: Path, options: dict[str, Any]) -> None:
 
     if run_scene(scene, RunOptions(**options)).interrupted:
         ctx.exit(INTERRUPTED)
+
+
+@cli.command()
+@click.argument("scene")
+@static_options
+@click.pass_context
+def static(ctx: click.Context, scene: str, **options: Any) -> None:
+    """Find the shape in which the loads of a scene are balanced.
+
+    SCENE is a scene file or the name of a demo: gravity, forces, tractions and pressures at their full size, pins and
+    handles at the end of their motion. Prints how Newton's method converges; loads are put on in steps where that is
+    needed. Writes displacement, stress and reactions, and a picture. Exit code 1: no balance was found; what is
+    written is then the last part of the loads that was balanced.
+
+    \b
+    Examples:
+      taichifem static bracket.toml
+      taichifem static bracket.toml --linear --set body.0.material.youngs=2e9 -o bracket.vtu
+    """
+    from taichifem.app.static import StaticOptions, run_static
+
+    if not run_static(scene, StaticOptions(**options)).converged:
+        ctx.exit(UNSOLVED)
 
 
 @cli.command()

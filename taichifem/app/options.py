@@ -129,3 +129,30 @@ compare_options = together(
     click.option("--json", "json_file", type=FILE, metavar="FILE", help="Write all figures to this file, too."),
     machine_options,
 )
+
+static_options = together(
+    click.option(
+        "--set",
+        "overrides",
+        multiple=True,
+        metavar="KEY=VALUE",
+        help="Change the scene, as in body.0.material.youngs=2e5. May be given again.",
+    ),
+    click.option("--linear", is_flag=True, help="Small strains: every material follows Hooke's law."),
+    click.option("--tolerance", type=float, default=1e-9, show_default=True, help="Imbalance relative to the forces."),
+    click.option("-o", "--output", type=FILE, metavar="FILE", help="Results on the mesh.  [default: out/NAME.vtu]"),
+    click.option("--picture", type=FILE, metavar="FILE", help="Picture of them.  [default: out/NAME.png]"),
+    click.option("--no-picture", is_flag=True, help="Draw nothing."),
+    click.option("--color", type=click.Choice(COLORS), help="What colours show.  [default: the scene's, or von-mises]"),
+    click.option(
+        "--size", type=Size(), metavar="WxH", default="1280x720", show_default=True, help="Of the picture [pixels]."
+    ),
+    click.option("--renderer", type=click.Choice(RENDERERS), default="auto", show_default=True, help="Who draws."),
+    click.option("--json", "json_file", type=FILE, metavar="FILE", help="Write all figures to this file, too."),
+    click.option("--arch", type=click.Choice(ARCHES), help="What to compute on.  [default: cpu]"),
+    click.option("--threads", type=click.IntRange(min=1), metavar="N", help="CPU threads.  [default: all cores]"),
+    click.option(
+        "--precision", type=click.Choice(PRECISIONS), default="f64", show_default=True, help="Of all numbers."
+    ),
+    click.option("-q", "--quiet", is_flag=True, help="Print nothing but errors."),
+)

@@ -10,11 +10,14 @@ import click
 
 from taichifem.errors import InputError
 
-BAD_INPUT, INTERRUPTED = 2, 130
+UNSOLVED, BAD_INPUT, INTERRUPTED = 1, 2, 130
 
 
 class Program(click.Group):
-    """A click group that ends with 0, with 2 and one line on stderr for bad input, or with 130 after Ctrl-C."""
+    """A click group that ends with 0, with 2 and one line on stderr for bad input, or with 130 after Ctrl-C.
+
+    1 is left to commands that found no answer to a well-posed question.
+    """
 
     def main(self, *args: Any, standalone_mode: bool = True, **extra: Any) -> NoReturn:
         try:

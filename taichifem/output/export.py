@@ -75,12 +75,17 @@ def _safe(name: str) -> str:
     return "".join(c if c.isalnum() or c in "-_." else "_" for c in name).strip(".") or "scene"
 
 
-def _vtu(path: Path, simulation: Any) -> None:
-    points = simulation.positions
+def write_vtu(path: Path, simulation: Any, **point_data: np.ndarray) -> None:
+    """Write the state of `simulation` as a .vtu file: displacement, velocity, stress, bodies, and further node data."""
+    points, kind = simulation.positions, "tetra" if simulation.dimension == 3 else "triangle"
     meshio.Mesh(
         points,
-        [("tetra", simulation.cells)],
-        point_data={"displacement": points - simulation.rest_positions, "velocity": simulation.velocities},
+        [(kind, simulation.cells)],
+        point_data={
+            "displacement": points - simulation.rest_positions,
+            "velocity": simulation.velocities,
+            **point_data,
+        },
         cell_data={
             "von_mises": [simulation.von_mises()],
             "cauchy_stress": [simulation.cauchy_stress().reshape(-1, 9)],
@@ -122,4 +127,4 @@ def _npz(path: Path, simulation: Any) -> None:
         )
 
 
-FORMATS: dict[str, Callable[[Path, Any], None]] = {"vtu": _vtu, "ply": _ply, "obj": _obj, "npz": _npz}
+FORMATS: dict[str, Callable[[Path, Any], None]] = {"vtu": write_vtu, "ply": _ply, "obj": _obj, "npz": _npz}
