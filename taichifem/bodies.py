@@ -13,6 +13,8 @@ from taichifem.integrators import EXACT, symplectic_euler
 from taichifem.laws import Laws
 from taichifem.layout import Layout, lay_out
 from taichifem.linear_algebra import assembly, balance
+from taichifem.linear_algebra.aggregates import aggregate
+from taichifem.linear_algebra.coarse import Coarse
 from taichifem.linear_algebra.pattern import BlockPattern, block_pattern
 from taichifem.linear_algebra.spectrum import highest_frequency
 from taichifem.processes.loading import Loading
@@ -37,6 +39,7 @@ class Bodies:
         self._materials = list(self._layout.materials)
         self._laws = Laws(self._materials, exact=scene.integrator in EXACT)
         self._loading = Loading(self._layout)
+        self._aggregates = aggregate(self._layout.rest, self._layout.body_start)
         self._generation = runtime.generation
         self._world: World = acquire(self._capacity(), precision, self)
         self._counts = Counts(
@@ -48,6 +51,7 @@ class Bodies:
         )
         with self._kernels():
             transfer.fill(self._world, self._layout, self._pattern)
+            self._space = Coarse(self._world, self._aggregates)
         self._surroundings = Surroundings(scene, self._layout, self._world, self._counts)
 
     def _capacity(self) -> Capacity:
@@ -63,6 +67,7 @@ class Bodies:
             pulled=1 + sum(len(g.nodes) for g in layout.handles),
             poses=len(layout.pins) + len(layout.handles),
             bodies=len(self.scene.bodies),
+            aggregates=self._aggregates.count,
             dimension=layout.dimension,
             tangents=self._laws.stores_tangents,
             springs=self._laws.springs,
@@ -99,6 +104,7 @@ class Bodies:
         with self._kernels():
             transfer.fill_table(self._world, rows, self._layout.body_start, flies)
             elements.gather_masses(self._world, self._counts.nodes, self._counts.bodies)
+        self._space.forget()
 
     def _surround(self, time: float, dt: float, *, all_act: bool = False) -> None:
         """Put pins, handles and colliders where they stand at `time` [s]."""

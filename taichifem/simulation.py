@@ -112,6 +112,7 @@ class Simulation(Bodies):
             gravity=gravity,
             options=Options(**chosen | options),
             timer=self._timer,
+            space=self._space,
             follow=self._follow if self._loading.follows else None,
             fresh=self._fresh,
             damped=any(m.stiffness_damping > 0 for m in self._materials),
@@ -253,7 +254,11 @@ class Simulation(Bodies):
         )
 
     def save(self, path: str | os.PathLike) -> None:
-        """Write everything the next steps depend on; see `load`. Raises InputError if it cannot be written."""
+        """Write everything the next steps depend on; see `load`. Raises InputError if it cannot be written.
+
+        What the solver has learnt is not written but forgotten, here as there, so that both runs go on alike.
+        """
+        self._space.forget()
         w, n, m = self._world, self._counts.nodes, self._counts.elements
         with self._kernels():
             arrays = {
@@ -285,6 +290,7 @@ class Simulation(Bodies):
                 transfer.write(w, getattr(w, name), arrays[name])
             transfer.write_contacts(w, arrays)
         self._clock, self._fresh = clock, bool(header["fresh"])
+        self._space.forget()
         self._surroundings.forget()
         self._surround(self.time, self.dt)
         self._stats = self._loaded = None

@@ -3,6 +3,7 @@
 import numpy as np
 
 from taichifem.layout import Layout
+from taichifem.linear_algebra.aggregates import Aggregates
 from taichifem.linear_algebra.pattern import BlockPattern
 from taichifem.runtime import PRECISIONS, ti
 from taichifem.world import World
@@ -68,6 +69,16 @@ def _fill_pattern(
         w.lower[i] = lower[i]
     for i in range(diagonal.shape[0]):
         w.diagonal[i] = diagonal[i]
+
+
+@ti.kernel
+def _fill_aggregates(w: ti.template(), node: _array(), start: _array(), of: _array()):
+    for k in range(node.shape[0]):
+        w.aggregate_node[k] = node[k]
+    for g in range(start.shape[0]):
+        w.aggregate_start[g] = start[g]
+    for i in range(of.shape[0]):
+        w.aggregate[i] = of[i]
 
 
 @ti.kernel
@@ -184,6 +195,12 @@ def fill(w: World, layout: Layout, pattern: BlockPattern) -> None:
         write(w, w.spring_share, layout.edge_shares)
     p = pattern
     _fill_pattern(w, p.row_start, p.column, p.pair_start, p.pair_entry, p.upper, p.lower, p.diagonal)
+
+
+def fill_aggregates(w: World, aggregates: Aggregates) -> None:
+    """Which nodes make up each aggregate."""
+    if aggregates.count:
+        _fill_aggregates(w, aggregates.node, aggregates.start, aggregates.of)
 
 
 def fill_table(w: World, table: np.ndarray, body_start: np.ndarray, body_flies: np.ndarray) -> None:

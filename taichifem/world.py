@@ -36,11 +36,12 @@ class Capacity:
     pulled: int = 1
     poses: int = 1
     bodies: int = 1
+    aggregates: int = 1
     dimension: int = 3  # of the elements: 3 for tetrahedra, 2 for triangles in the plane y = 0
     tangents: bool = False  # do elements store their stiffness blocks? Isotropic laws and springs need it
     springs: bool = False  # are there elements made of springs?
 
-    LEAST = (256, 1024, 4096, 2048, 8, 4, 256, 256, 8, 8)
+    LEAST = (256, 1024, 4096, 2048, 8, 4, 256, 256, 8, 8, 16)
 
     def rounded(self) -> Capacity:
         """The capacity class: every count rounded up to a power of two."""
@@ -86,6 +87,7 @@ class World:
         self._place_nodes()
         self._place_elements()
         self._place_matrix()
+        self._place_coarse()
         self._place_surroundings()
         self._builder.finalize()
 
@@ -154,6 +156,19 @@ class World:
         self.residual, self.direction, self.product = (self._vector(c.nodes, 3) for _ in range(3))
         self.partial = self._vector(CHUNKS, 7, ti.f64)
         self.scalar = self._scalar(16, ti.f64)
+
+    def _place_coarse(self) -> None:
+        n, groups = self.capacity.nodes, self.capacity.aggregates
+        self.aggregate, self.aggregate_node = self._scalar(n, ti.i32), self._scalar(n, ti.i32)
+        self.aggregate_start = self._scalar(groups + 1, ti.i32)
+        # Where each aggregate is, how far it has turned since the inverse was made, and its size; nodes' arms then.
+        self.centre, self.turn, self.reach = self._vector(groups, 3), self._vector(groups, 4), self._scalar(groups)
+        self.arm = self._vector(n, 3)
+        self.coarse, self.coarse_inverse = ti.field(ti.f64), ti.field(self.real)
+        for field in (self.coarse, self.coarse_inverse):
+            self._builder.dense(ti.ij, (6 * groups, 6 * groups)).place(field)
+        self.coarse_residual, self.coarse_solution = self._scalar(6 * groups), self._scalar(6 * groups)
+        self.shift, self.spin = self._vector(groups, 3), self._vector(groups, 3)
 
     def _place_surroundings(self) -> None:
         c = self.capacity

@@ -126,6 +126,7 @@ def solve(step: Step, *, h: float, newton: int, inertia: bool = True) -> StepRep
             return pcg.solve(
                 w,
                 counts,
+                step.space,
                 tolerance=step.options.tolerance,
                 max_iterations=step.options.max_iterations,
                 noise=noise,

@@ -1,4 +1,6 @@
-"""Conjugate gradients with a block-Jacobi preconditioner, on (A + springs) dv = load + spring_load.
+"""Conjugate gradients on (A + springs) dv = load + spring_load.
+
+The preconditioner is block Jacobi and, beside it, the rigid motions of aggregates (`coarse`).
 
 Axes that are held keep the dv they start with: their residual is masked out, and the preconditioner is zero
 there, so no search direction ever moves them.
@@ -14,7 +16,8 @@ import math
 from dataclasses import dataclass
 
 from taichifem.errors import Diverged
-from taichifem.linear_algebra import balance, matrix
+from taichifem.linear_algebra import balance, coarse, matrix
+from taichifem.linear_algebra.coarse import Coarse
 from taichifem.runtime import ti
 from taichifem.world import CHUNKS, Counts, World
 
@@ -89,7 +92,7 @@ def _judge(w: ti.template(), residual, sprung, change, tolerance):
 
 
 @ti.kernel
-def _begin(w: ti.template(), n: ti.i32, tolerance: ti.f64, noise: ti.f64, weight: ti.f64):
+def _begin(w: ti.template(), n: ti.i32, n_coarse: ti.i32, tolerance: ti.f64, noise: ti.f64, weight: ti.f64):
     """Preconditioner, first direction, and the size of load and weight (`weight` is gravity times dt).
 
     `noise` times the diagonal's size is what rounding leaves of the forces: a right-hand side below that
@@ -102,7 +105,6 @@ def _begin(w: ti.template(), n: ti.i32, tolerance: ti.f64, noise: ti.f64, weight
             r = w.residual[i]
             w.inverse[i] = _inverse_diagonal(w, i)
             z = w.inverse[i] @ r
-            w.direction[i] = z
             stiff = (w.block[w.diagonal[i]].trace() - 3 * w.mass[i]) * w.free[i].sum() / 9
             floor = ti.cast(noise, ti.f64) * ti.cast(stiff * w.x[i].norm(), ti.f64)
             sums += ti.Vector(
@@ -117,12 +119,16 @@ def _begin(w: ti.template(), n: ti.i32, tolerance: ti.f64, noise: ti.f64, weight
                 ]
             )
         w.partial[c] = sums
+    for g in range(n_coarse):
+        coarse.restrict(w, g)
+    for a in range(6 * n_coarse):
+        coarse.solve_row(w, n_coarse, a)
     ti.loop_config(serialize=True)
     for _ in range(1):
         sums = ti.Vector.zero(ti.f64, 7)
         for c in range(CHUNKS):
             sums += w.partial[c]
-        w.scalar[RZ] = sums[0]
+        w.scalar[RZ] = sums[0] + _coarse_product(w, n_coarse)
         w.scalar[LOAD] = ti.sqrt(sums[2])
         w.scalar[NOISE] = ti.sqrt(sums[3])
         w.scalar[WEIGHT] = ti.sqrt(sums[6])
@@ -130,10 +136,31 @@ def _begin(w: ti.template(), n: ti.i32, tolerance: ti.f64, noise: ti.f64, weight
         w.scalar[COUNT] = 0.0
         w.scalar[INDEFINITE] = 0.0
         _judge(w, sums[1], sums[4], sums[5], tolerance)
+    for i in range(n):
+        w.direction[i] = _preconditioned(w, n_coarse, i)
+
+
+@ti.func
+def _coarse_product(w: ti.template(), n_coarse: ti.i32):
+    """What the coarse space adds to r . z; on the way its solution is turned to where the aggregates are."""
+    total = ti.cast(0.0, ti.f64)
+    for a in range(6 * n_coarse):
+        total += ti.cast(w.coarse_residual[a] * w.coarse_solution[a], ti.f64)
+    for g in range(n_coarse):
+        coarse.prolong(w, g)
+    return total
+
+
+@ti.func
+def _preconditioned(w: ti.template(), n_coarse: ti.i32, i: ti.i32):
+    z = w.inverse[i] @ w.residual[i]
+    if n_coarse > 0:
+        z += coarse.correction(w, i)
+    return z
 
 
 @ti.kernel
-def _iterate(w: ti.template(), n: ti.i32, tolerance: ti.f64):
+def _iterate(w: ti.template(), n: ti.i32, n_coarse: ti.i32, tolerance: ti.f64):
     """One iteration; does nothing once the tolerance is met."""
     ti.loop_config(block_dim=1)
     for c in range(CHUNKS):
@@ -168,12 +195,19 @@ def _iterate(w: ti.template(), n: ti.i32, tolerance: ti.f64):
                 sums[3] += _change(w, i)
             for k in ti.static(range(4)):
                 w.partial[c][k] = sums[k]
+    for g in range(n_coarse):
+        if w.scalar[DONE] == 0:
+            coarse.restrict(w, g)
+    for a in range(6 * n_coarse):
+        if w.scalar[DONE] == 0:
+            coarse.solve_row(w, n_coarse, a)
     ti.loop_config(serialize=True)
     for _ in range(1):
         if w.scalar[DONE] == 0:
             sums = ti.Vector.zero(ti.f64, 7)
             for c in range(CHUNKS):
                 sums += w.partial[c]
+            sums[0] += _coarse_product(w, n_coarse)
             w.scalar[BETA] = sums[0] / w.scalar[RZ] if w.scalar[RZ] > 0 else 0.0
             w.scalar[RZ] = sums[0]
             w.scalar[COUNT] += 1
@@ -183,12 +217,13 @@ def _iterate(w: ti.template(), n: ti.i32, tolerance: ti.f64):
                 w.scalar[DONE] = 1.0
     for i in range(n):
         if w.scalar[DONE] == 0:
-            w.direction[i] = w.inverse[i] @ w.residual[i] + ti.cast(w.scalar[BETA], w.real) * w.direction[i]
+            w.direction[i] = _preconditioned(w, n_coarse, i) + ti.cast(w.scalar[BETA], w.real) * w.direction[i]
 
 
 def solve(
     w: World,
     counts: Counts,
+    space: Coarse,
     *,
     tolerance: float,
     max_iterations: int,
@@ -198,22 +233,24 @@ def solve(
 ) -> Convergence:
     """Improve `w.dv` until the residual is below `tolerance` times what acts on the nodes.
 
-    w: world with block, spring, load, spring_load, free and the start dv.  noise: relative rounding error of the
-    forces, over dt.  weight: gravity times dt [m/s].  drag_factor: of `w.drag` in the matrix.
+    w: world with block, spring, load, spring_load, free and the start dv.  space: its coarse space.
+    noise: relative rounding error of the forces, over dt.  weight: gravity times dt [m/s].
+    drag_factor: of `w.drag` in the matrix.
     Raises Diverged where the residual is not finite.
     """
-    n = counts.nodes
+    n, n_coarse = counts.nodes, space.prepare()
     _residual(w, n)
     balance.translate(w, counts.bodies, drag_factor)
-    _begin(w, n, tolerance, noise, weight)
+    _begin(w, n, n_coarse, tolerance, noise, weight)
     launched = 0
     while w.scalar[DONE] == 0 and launched < max_iterations and math.isfinite(w.scalar[RESIDUAL]):
         for _ in range(min(CHECK_EVERY, max_iterations - launched)):
-            _iterate(w, n, tolerance)
+            _iterate(w, n, n_coarse, tolerance)
             launched += 1
     balance.translate(w, counts.bodies, drag_factor)
     balance.spin(w, n, counts.bodies, drag_factor)
     residual = float(w.scalar[RESIDUAL])
+    space.observe(int(w.scalar[COUNT]))
     if not math.isfinite(residual):
         raise Diverged("the solver met a number that is not finite: take smaller time steps, or start more gently")
     return Convergence(
