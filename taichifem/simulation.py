@@ -160,6 +160,11 @@ class Simulation(Bodies):
         )
         return self._report
 
+    @property
+    def turn(self) -> float:
+        """Degrees by which pins or handles turn on their way to the last key time, at most."""
+        return self._surroundings.turn
+
     def take_back(self) -> None:
         """Undo the last `balance`: the shape, contacts, loads, and where pins and colliders stand."""
         share, positions, contacts = self._before

@@ -17,6 +17,9 @@ from taichifem.simulation import Simulation
 SMALLEST_STEP = 1 / 1024
 """Part of the loads below which stepping gives up."""
 
+LARGEST_TURN = 30.0
+"""Degrees that a pin may turn in one load step: set down after much more, it could have come either way."""
+
 
 @dataclass(frozen=True)
 class LoadStep:
@@ -73,19 +76,21 @@ def solve_static(
     """Balance a simulation of a `static_scene` under its full loads; state and loads are the last that were balanced.
 
     tolerance: imbalance of the nodes relative to the forces at work.  max_newton: linearisations a load step.
-    on_step: told of every attempt as it ends.  Motions are taken at their last key time, loads at their full size.
+    on_step: told of every attempt as it ends.  Motions are taken at their last key time, loads at their full size;
+    where a pin turns by more than `LARGEST_TURN`, they go on in steps from the start.
     A shape with elements turned inside out does not count as balanced: such a balance is not the one looked for.
     """
-    result, width = StaticResult(), 1.0
+    result = StaticResult()
+    width = widest = min(1.0, LARGEST_TURN / max(simulation.turn, 1e-300))
     while not result.converged:
-        share = min(1.0, result.share + width)
+        share = result.share + width if result.share + width < 1 - 1e-9 else 1.0
         converged, report = _attempt(simulation, share, tolerance, max_newton)
         result.steps.append(LoadStep(share, converged, tuple(report.history)))
         if on_step is not None:
             on_step(result.steps[-1])
         if converged:
             result.share = share
-            width *= 2
+            width = min(2 * width, widest)
         else:
             width = 0.5 * (share - result.share)
             if width < SMALLEST_STEP:
