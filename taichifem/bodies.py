@@ -11,7 +11,7 @@ from taichifem.description.check import whole
 from taichifem.errors import InputError
 from taichifem.integrators import EXACT, symplectic_euler
 from taichifem.laws import Laws
-from taichifem.layout import Layout, lay_out
+from taichifem.layout import AXES, Layout, lay_out
 from taichifem.linear_algebra import assembly, balance
 from taichifem.linear_algebra.aggregates import aggregate
 from taichifem.linear_algebra.coarse import Coarse
@@ -53,6 +53,7 @@ class Bodies:
             transfer.fill(self._world, self._layout, self._pattern)
             self._space = Coarse(self._world, self._aggregates)
         self._surroundings = Surroundings(scene, self._layout, self._world, self._counts)
+        self._gravity = np.asarray(scene.gravity, dtype=float)
 
     def _capacity(self) -> Capacity:
         layout, pattern = self._layout, self._pattern
@@ -103,7 +104,8 @@ class Bodies:
         flies = np.where(held, balance.HELD, np.where(turning, balance.TURNS, balance.LINEAR))
         with self._kernels():
             transfer.fill_table(self._world, rows, self._layout.body_start, flies)
-            elements.gather_masses(self._world, self._counts.nodes, self._counts.bodies)
+            inertia = self.scene.integrator != "quasi-static"
+            elements.gather_masses(self._world, self._counts.nodes, self._counts.bodies, inertia)
         self._space.forget()
 
     def _surround(self, time: float, dt: float, *, all_act: bool = False) -> None:
@@ -259,6 +261,13 @@ class Bodies:
         self._measure()
         return float(self._read(self._world.energy).sum())
 
+    def turned_inside_out(self) -> np.ndarray:
+        """Elements (k,) whose volume is not positive now; never linear ones, whose shape has no such meaning."""
+        corners = self.positions[self.cells][:, :, AXES[self.dimension]]
+        volume = np.linalg.det(corners[:, 1:] - corners[:, :1])
+        linear = np.array([m.model == "linear" for m in self._materials])
+        return np.flatnonzero((volume <= 0) & ~linear[self._layout.cell_materials])
+
     def critical_step(self) -> float:
         """The longest stable step [s] of symplectic Euler at the current positions; infinite without stiffness.
 
@@ -276,5 +285,5 @@ class Bodies:
 
         What elastic forces, loads and gravity leave over, on every node: zero but for round-off where nothing holds.
         """
-        outside = self._read(self._world.outside) + self.masses[:, None] * np.asarray(self.scene.gravity)
+        outside = self._read(self._world.outside) + self.masses[:, None] * self._gravity
         return -(self.elastic_forces() + outside)

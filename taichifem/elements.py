@@ -208,11 +208,11 @@ def measure(w: ti.template(), n_elements: ti.i32, most: ti.i32):
 
 
 @ti.kernel
-def gather_masses(w: ti.template(), n: ti.i32, n_bodies: ti.i32):
+def gather_masses(w: ti.template(), n: ti.i32, n_bodies: ti.i32, inertia: ti.i32):
     """Lumped mass and mass-proportional damping of the nodes, and what sizes their contact springs.
 
     `w.contact_stiffness` [N/m] is the mean diagonal entry of the node's own stiffness block at rest, which no
-    rotation changes; `w.body_mass` [kg] is the mass of its body.
+    rotation changes; `w.body_mass` [kg] is the mass of its body, 0 without inertia.
     """
     for i in range(n):
         mass, drag, stiffness = ti.cast(0.0, w.real), ti.cast(0.0, w.real), ti.cast(0.0, w.real)
@@ -232,4 +232,4 @@ def gather_masses(w: ti.template(), n: ti.i32, n_bodies: ti.i32):
         for i in range(w.body_start[b], w.body_start[b + 1]):
             total += ti.cast(w.mass[i], ti.f64)
         for i in range(w.body_start[b], w.body_start[b + 1]):
-            w.body_mass[i] = ti.cast(total, w.real)
+            w.body_mass[i] = ti.cast(total, w.real) if inertia else ti.cast(0.0, w.real)

@@ -49,6 +49,8 @@ class Simulation(Bodies):
         self._stats: Stats | None = None
         self._fresh = True
         self._loaded: list[float] | None = None
+        self._share_on = 0.0
+        self._before: tuple[float, np.ndarray, dict[str, np.ndarray]] | None = None
         self._explicit = scene.integrator == "symplectic-euler"
         self._clock = Clock(fps=scene.fps, substeps=scene.substeps or 1)
         if scene.integrator == "quasi-static":
@@ -92,11 +94,12 @@ class Simulation(Bodies):
         with self._timer.phase("set-up"):
             self._surround(self._clock.end, self.dt)
             self._put_loads(self._clock.end)
-        self._advance(np.asarray(self.scene.gravity, dtype=float))
+        self._gravity = np.asarray(self.scene.gravity, dtype=float)
+        self._advance()
         self._clock.tick()
         self._fresh = False
 
-    def _advance(self, gravity: np.ndarray, **options: object) -> None:
+    def _advance(self, **options: object) -> None:
         """One step of the scene's integrator under what the world holds; `options` replace those of the scene."""
         scene = self.scene
         chosen = {
@@ -109,7 +112,7 @@ class Simulation(Bodies):
             counts=self._counts,
             laws=self._laws,
             dt=self.dt,
-            gravity=gravity,
+            gravity=self._gravity,
             options=Options(**chosen | options),
             timer=self._timer,
             space=self._space,
@@ -148,16 +151,35 @@ class Simulation(Bodies):
             raise InputError(f'integrator is {self.scene.integrator!r}: only "quasi-static" scenes can be balanced')
         self._timer.reset()
         with self._timer.phase("set-up"):
-            self._surround(share * self._surroundings.last_key, self.dt, all_act=True)
-            self._send_loads(lambda _: share)
+            self._before = self._share_on, self.positions, self._contact_state()
+            self._put_on(share)
         self._advance(
-            share * np.asarray(self.scene.gravity, dtype=float),
             tolerance=STATIC_TOLERANCE,
             max_iterations=max(STATIC_ITERATIONS, self.scene.max_iterations),
             newton=max_newton,
             newton_tolerance=tolerance,
         )
         return self._report
+
+    @property
+    def turn(self) -> float:
+        """Degrees by which pins or handles turn on their way to the last key time, at most."""
+        return self._surroundings.turn
+
+    def take_back(self) -> None:
+        """Undo the last `balance`: the shape, contacts, loads, and where pins and colliders stand."""
+        share, positions, contacts = self._before
+        self.set_positions(positions)
+        self._put_on(share)
+        if contacts:
+            with self._kernels():
+                transfer.write_contacts(self._world, contacts)
+
+    def _put_on(self, share: float) -> None:
+        """Put on the part `share` of all loads and motions."""
+        self._share_on, self._gravity = share, share * np.asarray(self.scene.gravity, dtype=float)
+        self._surround(share * self._surroundings.last_key, self.dt, all_act=True)
+        self._send_loads(lambda _: share)
 
     def _keep_stable(self) -> None:
         """Choose the steps a frame of an explicit method, or refuse those the scene asks for."""
@@ -231,9 +253,13 @@ class Simulation(Bodies):
         """Contacts between nodes and colliders after the last step."""
         if not self._counts.colliders:
             return 0
+        return int((self._contact_state()["touching"] > 0).sum())
+
+    def _contact_state(self) -> dict[str, np.ndarray]:
+        if not self._counts.colliders:
+            return {}
         with self._kernels():
-            state = transfer.read_contacts(self._world, self._counts.colliders, self._counts.nodes)
-        return int((state["touching"] > 0).sum())
+            return transfer.read_contacts(self._world, self._counts.colliders, self._counts.nodes)
 
     @property
     def stats(self) -> Stats:

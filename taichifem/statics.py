@@ -9,16 +9,16 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import dataclass, field, replace
 
-import numpy as np
-
 from taichifem.description import Material, Scene
 from taichifem.errors import Diverged
 from taichifem.integrators.step import Iteration, StepReport
-from taichifem.layout import AXES
 from taichifem.simulation import Simulation
 
 SMALLEST_STEP = 1 / 1024
 """Part of the loads below which stepping gives up."""
+
+LARGEST_TURN = 30.0
+"""Degrees that a pin may turn in one load step: set down after much more, it could have come either way."""
 
 
 @dataclass(frozen=True)
@@ -73,22 +73,24 @@ def solve_static(
     max_newton: int = 30,
     on_step: Callable[[LoadStep], None] | None = None,
 ) -> StaticResult:
-    """Balance a simulation of a `static_scene` under its full loads; the state is the last that was balanced.
+    """Balance a simulation of a `static_scene` under its full loads; state and loads are the last that were balanced.
 
     tolerance: imbalance of the nodes relative to the forces at work.  max_newton: linearisations a load step.
-    on_step: told of every attempt as it ends.  Motions are taken at their last key time, loads at their full size.
+    on_step: told of every attempt as it ends.  Motions are taken at their last key time, loads at their full size;
+    where a pin turns by more than `LARGEST_TURN`, they go on in steps from the start.
     A shape with elements turned inside out does not count as balanced: such a balance is not the one looked for.
     """
-    result, width = StaticResult(), 1.0
+    result = StaticResult()
+    width = widest = min(1.0, LARGEST_TURN / max(simulation.turn, 1e-300))
     while not result.converged:
-        share = min(1.0, result.share + width)
+        share = result.share + width if result.share + width < 1 - 1e-9 else 1.0
         converged, report = _attempt(simulation, share, tolerance, max_newton)
         result.steps.append(LoadStep(share, converged, tuple(report.history)))
         if on_step is not None:
             on_step(result.steps[-1])
         if converged:
             result.share = share
-            width *= 2
+            width = min(2 * width, widest)
         else:
             width = 0.5 * (share - result.share)
             if width < SMALLEST_STEP:
@@ -97,21 +99,11 @@ def solve_static(
 
 
 def _attempt(simulation: Simulation, share: float, tolerance: float, max_newton: int) -> tuple[bool, StepReport]:
-    before = simulation.positions
     try:
         report = simulation.balance(share=share, tolerance=tolerance, max_newton=max_newton)
+        good = report.balanced and not len(simulation.turned_inside_out())
     except Diverged:
-        simulation.set_positions(before)
-        return False, StepReport()
-    good = report.balanced and not turned_inside_out(simulation)
+        good, report = False, StepReport()
     if not good:
-        simulation.set_positions(before)
+        simulation.take_back()
     return good, report
-
-
-def turned_inside_out(simulation: Simulation) -> int:
-    """Number of elements whose volume is not positive now; 0 for linear bodies, whose shape has no such meaning."""
-    if all(b.material.model == "linear" for b in simulation.scene.bodies):
-        return 0
-    corners = simulation.positions[simulation.cells][:, :, AXES[simulation.dimension]]
-    return int((np.linalg.det(corners[:, 1:] - corners[:, :1]) <= 0).sum())

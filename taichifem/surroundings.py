@@ -36,8 +36,18 @@ class Surroundings:
     @property
     def last_key(self) -> float:
         """The last time [s] at which a motion has a key; 0 if nothing moves."""
+        return max((motion.times[-1] for motion in self._motions), default=0.0)
+
+    @property
+    def turn(self) -> float:
+        """What the fastest turn of a pin or handle would make until the last key [degrees]."""
+        turns = [group.motion.fastest_turn for group in self._groups if group.motion is not None]
+        return max(turns, default=0.0) * self.last_key
+
+    @property
+    def _motions(self) -> list[Motion]:
         motions = [group.motion for group in self._groups] + [c.motion for c in self._scene.colliders]
-        return max((motion.times[-1] for motion in motions if motion is not None), default=0.0)
+        return [motion for motion in motions if motion is not None]
 
     def update(self, time: float, dt: float, *, all_act: bool = False) -> bool:
         """Put everything where it stands at `time` [s], the end of a step of `dt` [s].

@@ -7,6 +7,7 @@ second simulation of about the same size in a process starts without compiling.
 
 from __future__ import annotations
 
+import gc
 import weakref
 from dataclasses import astuple, dataclass
 
@@ -202,6 +203,8 @@ def acquire(capacity: Capacity, precision: str, owner: object) -> World:
     runtime.start()
     key = (runtime.generation, precision, *astuple(capacity.rounded()))
     shelf = _free.setdefault(key, [])
+    if not shelf:
+        gc.collect()  # a simulation in a cycle, such as an exception's, may still hold one: compiling takes far longer
     world = shelf.pop() if shelf else World(capacity.rounded(), precision)
     weakref.finalize(owner, shelf.append, world)
     return world

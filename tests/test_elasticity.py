@@ -1,5 +1,7 @@
 """Forces, stiffness and stress against independent codes, and the identities they must obey."""
 
+import json
+
 import numpy as np
 import pytest
 from motions import random_rotation
@@ -191,3 +193,17 @@ def test_set_material_acts_at_once(soft_block):
     soft_block.set_material(0, tf.Material(youngs=3e5, poisson=0.3))
     np.testing.assert_allclose(soft_block.elastic_forces(), 3 * before, rtol=1e-9, atol=1e-9)
     soft_block.set_material(0, old)
+
+
+@pytest.mark.parametrize("case", (0, 1))
+def test_vibration_modes_match_scikit_fem(oracles, case):
+    """The first ten frequencies of the clamped bar, with lumped masses."""
+    known = json.loads((oracles / "modes_bar.json").read_text())["cases"][case]
+    mesh = tf.TetMesh.bar(size=(1, 0.2, 0.2), cells=(12, 3, 3), split=6)
+    material = tf.Material(model="linear", youngs=known["E"], poisson=known["nu"], density=known["rho"])
+    simulation = tf.Simulation(tf.Scene(bodies=[tf.Body(mesh=mesh, material=material)]), precision="f64")
+    free = np.repeat(mesh.points[:, 0] > 1e-9, 3)
+    scale = 1 / np.sqrt(np.repeat(simulation.masses, 3)[free])
+    matrix = simulation.stiffness().toarray()[np.ix_(free, free)] * scale * scale[:, None]
+    hertz = np.sqrt(np.linalg.eigvalsh(matrix)[:10]) / (2 * np.pi)
+    np.testing.assert_allclose(hertz, known["hz_skfem_lumped"], rtol=1e-9)

@@ -57,6 +57,12 @@ class Motion:
         if self.repeat and len(times) < 2:
             raise InputError("repeat needs at least two times")
 
+    @property
+    def fastest_turn(self) -> float:
+        """Greatest angular speed on the way [degrees/s]."""
+        speed = np.abs(np.diff(self.angle)) / np.diff(self.times) if len(self.angle) > 1 else np.zeros(1)
+        return float(speed.max()) * (1.5 if self.smooth else 1.0)
+
     def at(self, time: float) -> tuple[np.ndarray, np.ndarray]:
         """Rotation R (3,3) and offset c (3,) [m] at `time` [s], so that x = R X + c."""
         times = np.asarray(self.times, dtype=float)

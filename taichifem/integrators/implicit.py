@@ -119,7 +119,7 @@ def solve(step: Step, *, h: float, newton: int, inertia: bool = True) -> StepRep
     counts = step.counts if inertia else replace(step.counts, bodies=0)
     weight = float(np.linalg.norm(step.gravity)) * h if inertia else ALWAYS
     noise = float(np.finfo(np.float32 if w.precision == "f32" else np.float64).eps) / h
-    report, reference = StepReport(balanced=newton == 1), 0.0
+    report, first = StepReport(balanced=newton == 1), 0.0
 
     def solve_linear(_: int) -> pcg.Convergence:
         with step.timer.phase("solve"):
@@ -150,11 +150,11 @@ def solve(step: Step, *, h: float, newton: int, inertia: bool = True) -> StepRep
         with step.timer.phase("update"):
             _update(w, n, h)
         report.linearisations = k + 1
-        reference = reference or done.load
-        if not inertia:
-            reference = max(reference, _at_work(w, n, h))
-        imbalance, length = done.load / max(reference, 1e-150), 1.0
-        if k > 0 and done.load <= max(step.options.newton_tolerance * reference, done.noise):
+        first = first or done.load
+        # Never against forces of the past: a shape that blew up and came back need not be balanced.
+        at_work = first if inertia else max(first, _at_work(w, n, h))
+        imbalance, length = done.load / max(at_work, 1e-150), 1.0
+        if k > 0 and done.load <= max(step.options.newton_tolerance * at_work, done.noise):
             report.balanced = True
         elif k + 1 < newton:
             exact = exact or (imbalance < NEAR and k > 0)

@@ -2,12 +2,12 @@
 
 A node that ends the step inside a collider is pushed out by a spring along the normal, `STIFFNESS` times as stiff as
 the node itself: a soft body sinks in by a tenth of what it gives way. It need never be stiffer than what stops the
-whole body within a step, M / dt^2, nor softer than what stops the node, m / dt^2. Friction is a spring
-too, from the place where the node began to stick, and slips when it passes mu times the normal force; its stretch
-is kept from step to step, so that a body at rest on a slope stays there (Cundall & Strack 1979). Both are taken
-at the end of the step, and which nodes touch and slip is settled by solving again while that still changes. The
-normal forces that limit friction start from those of the last step and are renewed once the contacts have settled;
-renewing them in every solve can run away, since friction itself tips weight from node to node.
+whole body within a step, M / dt^2, nor softer than what stops the node, m / dt^2; without inertia neither counts.
+Friction is a spring too, from the place where the node began to stick, and slips when it passes mu times the normal
+force; its stretch is kept from step to step, so that a body at rest on a slope stays there (Cundall & Strack 1979).
+Both are taken at the end of the step, and which nodes touch and slip is settled by solving again while that still
+changes. The normal forces that limit friction start from those of the last step and are renewed once the contacts
+have settled; renewing them in every solve can run away, since friction itself tips weight from node to node.
 """
 
 from taichifem.formulas import collision
@@ -42,8 +42,10 @@ def _gap(w: ti.template(), c: ti.i32, start, end):
 def _spring(w: ti.template(), i: ti.i32, h):
     """Stiffness [N/m] of the contact springs of node i."""
     inertia = 1 / (h * h)
-    own = ti.min(w.contact_stiffness[i], w.body_mass[i] * inertia)
-    return ti.cast(STIFFNESS, w.real) * ti.max(own, w.mass[i] * inertia)
+    own = w.contact_stiffness[i]
+    if w.body_mass[i] > 0:
+        own = ti.max(ti.min(own, w.body_mass[i] * inertia), w.mass[i] * inertia)
+    return ti.cast(STIFFNESS, w.real) * own
 
 
 @ti.func
