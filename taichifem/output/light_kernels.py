@@ -40,6 +40,7 @@ Look = ti.types.struct(
     patch=vec2,  # first corner of the occlusion grid, along u and v [m]
     patch_texel=ti.f32,  # [m]
     shadow_texel=ti.f32,  # [m]
+    thin=ti.i32,  # triangles below this number are lit from both sides
     wired=ti.i32,  # triangles below this number show their edges
     wire_width=ti.f32,  # pixels
 )

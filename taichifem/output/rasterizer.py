@@ -21,6 +21,7 @@ UNDERSIDE = 64
 """Texels along the side of the view from below."""
 
 _KEY = np.array([1.0, 0.93, 0.82]) * 1.18
+_LIGHT, _LIGHT_ON_SHEETS = (0.55, -0.75, 1.25), (0.9, -0.55, 1.05)  # towards the viewer, to the left, up
 _SKY = np.array([0.86, 0.94, 1.06]) * 0.46
 _FILL = np.array([0.80, 0.90, 1.0]) * 0.16
 _HORIZON = colors.light_shown_as(np.array([0.955, 0.962, 0.968]))
@@ -78,7 +79,8 @@ class Rasterizer:
             flat = -viewpoint.forward * [1, 1, 0] + 1e-6 * viewpoint.up
             flat /= np.linalg.norm(flat)
             side = np.cross([0, 0, 1.0], flat)
-            light = 0.55 * flat - 0.75 * side + np.array([0, 0, 1.25])
+            # What is flat has one shade all over: the light meets it more from the front.
+            light = np.array(_LIGHT_ON_SHEETS if solids.flat else _LIGHT) @ [flat, side, [0, 0, 1]]
             self._light = light / np.linalg.norm(light)
         with runtime.precision_of("f32"):
             picture = self._render(solids, frame, viewpoint)
@@ -130,7 +132,7 @@ class Rasterizer:
         shadow = _scratch.get("shadow", ti.f32, side**2)
         nearest = _scratch.get("nearest", ti.f32, (side // light_kernels.BLOCK) ** 2)
         light_kernels.shadow_map(keys, int(layout[1, 2]), side, shadow, nearest)
-        look = self._look(frame, viewpoint, ground, matrices, texel)
+        look = self._look(frame, solids, viewpoint, ground, matrices, texel)
         picture = np.empty((height, width, 3), np.uint8)
         shading_kernels.shade(
             keys,
@@ -152,6 +154,7 @@ class Rasterizer:
     def _look(
         self,
         frame: Frame,
+        solids: Solids,
         viewpoint: Viewpoint,
         ground: _Ground,
         matrices: np.ndarray,
@@ -186,6 +189,7 @@ class Rasterizer:
             patch=ground.patch,
             patch_texel=ground.texel,
             shadow_texel=texel,
+            thin=len(frame.triangles) if solids.flat else 0,
             wired=len(frame.triangles) if frame.wire else 0,
             wire_width=max(1.0, self.size[1] / 720),
         )

@@ -7,11 +7,23 @@ costs only where something ends.
 
 from taichifem.output.colors import ENCODING_SIZE, KNEE
 from taichifem.output.light_kernels import Look, Table, background, nearness_of_ground, ray, sky_left, sunlit, vec2
-from taichifem.output.raster_kernels import EMPTY, Corners, Grid, Keys, Points, Triangles, edge_functions, project, vec3
+from taichifem.output.raster_kernels import (
+    EMPTY,
+    Corners,
+    Grid,
+    Keys,
+    Points,
+    Triangles,
+    edge_functions,
+    project,
+    vec3,
+    xyw,
+)
 from taichifem.runtime import ti
 
 Pixels = ti.types.ndarray(dtype=ti.u8, ndim=3)
 
+LUMINANCE = vec3(0.2126, 0.7152, 0.0722)
 GROUND = -1
 BACKGROUND = -2
 
@@ -74,10 +86,16 @@ def surface_light(
     direction: vec3,
     normal: vec3,
     albedo: vec3,
+    thin: bool,
 ) -> vec3:
-    """Light from a point p of a solid: key light with shadow, sky above, bounce from the ground below."""
+    """Light from a point p of a solid: key light with shadow, sky above, bounce from the ground below.
+
+    thin: of a sheet, which the key light shines through, so that it is seen as well from behind.
+    """
     view = -direction.normalized()
     n = ti.select(normal.dot(view) < 0, -normal, normal)
+    if thin and n.dot(look.to_light) < 0:
+        n = -n
     facing = n.dot(look.to_light)
     sun = 0.0
     if facing > 0:
@@ -94,11 +112,18 @@ def surface_light(
     shine = ti.max(n.dot(half), 0.0)
     for _ in ti.static(range(5)):
         shine *= shine
-    rim = ti.math.clamp(1 - n.dot(view), 0.0, 1.0)
+    rim = ti.math.clamp(1 - ti.abs(n.dot(view)), 0.0, 1.0)
     rim *= rim * rim
-    fill = look.fill * ti.max(-n.dot(look.to_light) * 0.6 + n.dot(view) * 0.4, 0.0)
+    fill = look.fill * ti.max(-n.dot(look.to_light) * 0.6 + ti.abs(n.dot(view)) * 0.4, 0.0)
     diffuse = albedo * (facing * sun * look.key + ambient + fill)
     return diffuse + 0.16 * shine * sun * look.key + 0.12 * rim * look.sky * up
+
+
+@ti.func
+def line_light(light: vec3, albedo: vec3) -> vec3:
+    """Light of an edge drawn on a surface: darker than it, or lighter where that is too dark to tell."""
+    dark = 1 - ti.math.smoothstep(0.035, 0.06, albedo.dot(LUMINANCE))
+    return ti.math.mix(0.45 * light, light + 0.12, dark)
 
 
 @ti.func
@@ -134,13 +159,20 @@ def triangle_light(
         normal += weight[k] * normals[thing, k]
         albedo += weight[k] * colors[thing, k]
     normal /= ti.max(normal.norm(), 1e-30)
-    light = surface_light(shadow, nearest, occlusion, look, reach, p, direction, normal, albedo)
+    light = surface_light(shadow, nearest, occlusion, look, reach, p, direction, normal, albedo, thing < look.thin)
     if thing < look.wired:
-        closest = 1e9
+        corners = ti.Matrix.rows([xyw(project(view, a)), xyw(project(view, b)), xyw(project(view, c))])
+        closest, least = 1e9, 1e9
         for k in ti.static(range(3)):
-            slope = ti.sqrt(e[k, 0] * e[k, 0] + e[k, 1] * e[k, 1])
-            closest = ti.min(closest, across[k] / (samples * ti.max(slope, 1e-30)))
-        light *= 1 - 0.55 * ti.math.clamp(0.5 * look.wire_width + 0.5 - closest, 0.0, 1.0)
+            slope = samples * ti.max(ti.sqrt(e[k, 0] * e[k, 0] + e[k, 1] * e[k, 1]), 1e-30)
+            closest = ti.min(closest, across[k] / slope)
+            if corners[k, 2] > 0:
+                opposite = e[k, 0] * corners[k, 0] + e[k, 1] * corners[k, 1] + e[k, 2] * corners[k, 2]
+                least = ti.min(least, opposite / (corners[k, 2] * slope))
+        line = ti.math.clamp(0.5 * look.wire_width + 0.5 - closest, 0.0, 1.0)
+        # Where triangles are hardly wider than lines, these would only darken.
+        line *= ti.math.smoothstep(1.5, 6.0, least / look.wire_width)
+        light = ti.math.mix(light, line_light(light, albedo), line)
     return light
 
 

@@ -20,7 +20,7 @@ class Solids:
 
     points: (n,3) float32 [m].  triangles: (k,3) int32, the bodies' first; the last one is a placeholder of no
     extent, so that no array is ever empty.  colors: (k,3,3) float32, linear light, one for each corner.
-    floor: the plane that carries the scene, or None.
+    floor: the plane that carries the scene, or None.  flat: are all bodies sheets in one plane?
     center, radius: of a ball [m] that holds everything that casts a shadow.
 
     Walls (planes that are not the floor) are left out where `eye` (3,) [m] is behind them. Triangles with a node
@@ -43,6 +43,7 @@ class Solids:
         seen = bodies[there]
         self.low, self.high = (seen.min(axis=0), seen.max(axis=0)) if len(seen) else np.zeros((2, 3))
         extent = max(float(np.linalg.norm(self.high - self.low)), 1e-6)
+        self.flat = bool((self.high - self.low).min() <= 1e-6 * extent)
 
         solids = [s for s in frame.colliders if s.kind != "plane"]
         grey = colors.to_linear(colors.parse_hex(colors.COLLIDER))

@@ -165,3 +165,34 @@ def test_odd_frames_are_drawn():
     assert not reddish(picture(broken)).any()
     from_below = picture(sphere([0, 0, 0.6], 0.5, colliders=(GROUND,)), eye=(0, -4, -1), target=(0, 0, 0.6))
     assert reddish(from_below).sum() > 1000, "the ground does not hide what is above it from below"
+
+
+SHEET = ([[-1, 0, -1], [1, 0, -1], [1, 0, 1], [-1, 0, 1]], [[0, 1, 2], [0, 2, 3]])
+DARK = (0.267, 0.004, 0.329)
+
+
+@pytest.mark.parametrize("color", [RED, DARK, (0.99, 0.9, 0.15)])
+def test_wire_shows_on_dark_and_on_bright(color):
+    plain, wired = (picture(frame_of(*SHEET, color, wire=wire), eye=(0, -5, 0), target=(0, 0, 0)) for wire in (0, 1))
+    apart = np.abs(plain - wired).sum(axis=2)
+    assert 100 < (apart > 60).sum() < 2000
+
+
+def test_wire_of_tiny_triangles_does_not_darken():
+    grid = np.stack(np.meshgrid(np.linspace(-1, 1, 121), np.linspace(-1, 1, 121)), -1).reshape(-1, 2)
+    a = (np.arange(120)[:, None] + 121 * np.arange(120)).ravel()
+    triangles = np.vstack([np.stack([a, a + 1, a + 122], axis=1), np.stack([a, a + 122, a + 121], axis=1)])
+    points = np.column_stack([grid[:, 0], np.zeros(len(grid)), grid[:, 1]])
+    frames = [frame_of(points, triangles, wire=wire) for wire in (False, True)]
+    plain, wired = (picture(frame, eye=(0, -5, 0), target=(0, 0, 0)) for frame in frames)
+    assert np.abs(plain - wired).max() < 12
+
+
+def test_a_sheet_is_lit_from_both_sides():
+    renderer = Rasterizer(SIZE, Camera(eye=(0, -5, 0.5), target=(0, 0, 0)), quality="draft")
+    levels = []
+    for y in (-5, 5):
+        renderer.move(Camera(eye=(0, y, 0.5), target=(0, 0, 0)))
+        levels.append(int(renderer.draw(frame_of(*SHEET))[100:140, 140:180, 0].mean()))
+    shown = 255 * RED[0]
+    assert min(levels) > 0.85 * shown and max(levels) < 1.15 * shown, "and about in its own colour"
