@@ -271,12 +271,13 @@ class Bodies:
     def critical_step(self) -> float:
         """The longest stable step [s] of symplectic Euler at the current positions; infinite without stiffness.
 
-        From the highest frequency of the elements and masses on the axes that no pin holds, and the largest damping.
+        From the highest frequency of the elements, with tangents projected to positive semi-definite, and masses, on
+        the axes that no pin holds for ever; and the largest damping.
         """
-        held = self._surroundings.held
+        held = self._surroundings.held_for_ever
         free = np.ones((self._counts.nodes, 3))
         np.minimum.at(free, held[:, 0].astype(int), 1.0 - held[:, 2:])
-        frequency = highest_frequency(self.stiffness(), self.masses, free)
+        frequency = highest_frequency(self.stiffness(projected=True), self.masses, free)
         damping = [max(getattr(m, name) for m in self._materials) for name in ("mass_damping", "stiffness_damping")]
         return symplectic_euler.critical_step(frequency, *damping)
 

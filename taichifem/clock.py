@@ -33,6 +33,14 @@ class Clock:
         """Time [s] at the end of the step in work."""
         return (self.frame * self.substeps + self.substep + 1) / (self.fps * self.substeps)
 
+    def divide(self, substeps: int) -> None:
+        """Take `substeps` steps a frame; within a frame the next multiple of those so far, so that time is exact."""
+        if self.substep == 0:
+            self.substeps = substeps
+        else:
+            factor = -(-substeps // self.substeps)
+            self.substeps, self.substep = factor * self.substeps, factor * self.substep
+
     def tick(self) -> None:
         """A step is done."""
         self.steps += 1

@@ -45,13 +45,16 @@ def respond(
     law: ti.template(),
     number: ti.i32,
     n_elements: ti.i32,
+    stiffness_factor: ti.f64,
+    damping_factor: ti.f64,
     rate_factor: ti.f64,
     rate_damping: ti.f64,
     projected: ti.i32,
 ):
-    """After `decompose`: corner forces, as in `elements.deform`, and the tangent of the elements of law `number`.
+    """After `decompose`: corner forces, and the tangent of the elements of law `number`, as in `elements.deform`.
 
-    projected: 0 takes the exact tangent, which may be indefinite.
+    projected: 0 takes the exact tangent, which may be indefinite. Damping has the projected one always: with the
+    exact one it would feed crushed elements energy.
     """
     for e in range(n_elements):
         row = w.table[w.material[e]]
@@ -59,36 +62,37 @@ def respond(
             la, mu = row[elements.LAMBDA], row[elements.MU]
             U, s, V = w.svd_u[e], w.stretch[e], w.svd_v[e]
             A, p, q = isotropic.tangent(law, s, la, mu)
+            damping_a, damping_p, damping_q = isotropic.project(A, p, q)
             if projected:
-                A, p, q = isotropic.project(A, p, q)
-            rate = elements.edges(w.v, w, e) @ w.gradients[e]
-            share = ti.cast(rate_factor, w.real) + ti.cast(rate_damping, w.real) * row[elements.STIFFNESS_DAMPING]
+                A, p, q = damping_a, damping_p, damping_q
+            rate, beta = elements.edges(w.v, w, e) @ w.gradients[e], row[elements.STIFFNESS_DAMPING]
+            share = ti.cast(rate_factor, w.real) + ti.cast(rate_damping, w.real) * beta
             P = isotropic.first_piola(U, law.slope(s, la, mu), V)
-            P += share * isotropic.stress_change(rate, U, V, A, p, q)
+            P += share * isotropic.stress_change(rate, U, V, damping_a, damping_p, damping_q)
             w.corner_force[e] = elements.with_first(-w.volume[e] * (w.gradients[e] @ P.transpose()))
-            w.tangent_a[e], w.tangent_p[e], w.tangent_q[e] = A, p, q
+            own, extra = ti.cast(stiffness_factor, w.real), ti.cast(damping_factor, w.real) * beta
+            w.tangent_a[e] = own * A + extra * damping_a
+            w.tangent_p[e] = own * p + extra * damping_p
+            w.tangent_q[e] = own * q + extra * damping_q
 
 
 @ti.kernel
-def store_blocks(w: ti.template(), n_elements: ti.i32, stiffness_factor: ti.f64, damping_factor: ti.f64):
-    """After `respond`: blocks V K_ab, times stiffness_factor + damping_factor beta, in `w.tangent`."""
+def store_blocks(w: ti.template(), n_elements: ti.i32):
+    """After `respond`: blocks V K_ab of what it made the tangent, in `w.tangent`."""
     for k in range(n_elements * w.corner_pairs):
         e = k // w.corner_pairs
-        row = w.table[w.material[e]]
-        if row[elements.MODEL] >= elements.FIRST_LAW:
+        if w.table[w.material[e]][elements.MODEL] >= elements.FIRST_LAW:
             # Pair number back to corners: rows of 4, 3, 2 and 1, or of 3, 2 and 1.
             left, a = k % w.corner_pairs, 0
             while left >= w.corners - a:
                 left -= w.corners - a
                 a += 1
             b = a + left
-            damping = row[elements.STIFFNESS_DAMPING]
-            factor = ti.cast(stiffness_factor, w.real) + ti.cast(damping_factor, w.real) * damping
             g_a, g_b = elements.gradient(w, e, a), elements.gradient(w, e, b)
             block = isotropic.stiffness_block(
                 g_a, g_b, w.svd_u[e], w.svd_v[e], w.tangent_a[e], w.tangent_p[e], w.tangent_q[e]
             )
-            w.tangent[k] = w.volume[e] * factor * block
+            w.tangent[k] = w.volume[e] * block
 
 
 @ti.kernel

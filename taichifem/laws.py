@@ -87,8 +87,8 @@ class Laws:
         if self._laws:
             isotropic_elements.decompose(w, counts.elements, ROTATION_ITERATIONS, keep)
             for number, law in self._laws:
-                isotropic_elements.respond(w, law, number, counts.elements, rate, rate_damping, projected)
-            isotropic_elements.store_blocks(w, counts.elements, stiffness, damping)
+                isotropic_elements.respond(w, law, number, counts.elements, *factors, projected)
+            isotropic_elements.store_blocks(w, counts.elements)
 
     def push(self, w: World, counts: Counts, *, damped: bool) -> None:
         """Corner forces alone, with those of stiffness damping if `damped`: what an explicit step needs."""
@@ -101,7 +101,7 @@ class Laws:
             isotropic_elements.decompose(w, counts.elements, ROTATION_ITERATIONS, True)
             for number, law in self._laws:
                 if damped:
-                    isotropic_elements.respond(w, law, number, counts.elements, 0.0, rate_damping, False)
+                    isotropic_elements.respond(w, law, number, counts.elements, 0.0, 0.0, 0.0, rate_damping, True)
                 else:
                     isotropic_elements.push(w, law, number, counts.elements)
 

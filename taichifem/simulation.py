@@ -52,6 +52,7 @@ class Simulation(Bodies):
         self._share_on = 0.0
         self._before: tuple[float, np.ndarray, dict[str, np.ndarray]] | None = None
         self._explicit = scene.integrator == "symplectic-euler"
+        self._restiffened = False
         self._clock = Clock(fps=scene.fps, substeps=scene.substeps or 1)
         if scene.integrator == "quasi-static":
             check_supports(scene, self._layout)
@@ -88,8 +89,10 @@ class Simulation(Bodies):
 
     def step(self) -> None:
         """Advance by one time step. Raises Diverged, with the state before the step kept, on NaN or infinity."""
-        if self._explicit and self._clock.substep == 0 and self.scene.substeps is None and not self._laws.linear:
-            self._keep_stable()
+        if self._explicit and self._clock.substep == 0 and self.scene.substeps is None:
+            if self._restiffened or not self._laws.linear:
+                self._keep_stable()
+            self._restiffened = False
         self._timer.reset()
         with self._timer.phase("set-up"):
             self._surround(self._clock.end, self.dt)
@@ -117,7 +120,8 @@ class Simulation(Bodies):
             timer=self._timer,
             space=self._space,
             follow=self._follow if self._loading.follows else None,
-            fresh=self._fresh,
+            # Methods that look back start anew where a load jumps: they would smear it over the steps around.
+            fresh=self._fresh or self._loading.jumps(self._clock.time, self._clock.end),
             damped=any(m.stiffness_damping > 0 for m in self._materials),
         )
         self._stats = None
@@ -186,7 +190,7 @@ class Simulation(Bodies):
         critical = self.critical_step()
         longest = 1.0 / (self.scene.fps * critical) if critical < math.inf else 0.0
         if self.scene.substeps is None:
-            self._clock.substeps = max(1, math.ceil(longest / symplectic_euler.SAFETY))
+            self._clock.divide(max(1, math.ceil(longest / symplectic_euler.SAFETY)))
         elif self.dt > critical:
             raise InputError(
                 f"simulation.substeps is {self.scene.substeps}, a step of {1e3 * self.dt:.4g} ms, and symplectic Euler "
@@ -228,7 +232,8 @@ class Simulation(Bodies):
         row = self._row(body, region)
         before = self._materials[row]
         self._change_material(row, material)
-        if self._explicit and (self.scene.substeps is not None or self._clock.substep == 0):
+        if self._explicit:
+            self._restiffened = True
             try:
                 self._keep_stable()
             except InputError:

@@ -49,6 +49,12 @@ class Surroundings:
         motions = [group.motion for group in self._groups] + [c.motion for c in self._scene.colliders]
         return [motion for motion in motions if motion is not None]
 
+    @property
+    def held_for_ever(self) -> np.ndarray:
+        """The rows of `held` that no time lets go."""
+        lasting = np.array([group.until is None for group in self._groups], dtype=bool)
+        return self.held[lasting[self.held[:, 1].astype(int)]]
+
     def update(self, time: float, dt: float, *, all_act: bool = False) -> bool:
         """Put everything where it stands at `time` [s], the end of a step of `dt` [s].
 

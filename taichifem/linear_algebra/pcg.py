@@ -86,7 +86,8 @@ def _judge(w: ti.template(), residual, sprung, change, tolerance):
     impulse = ti.sqrt(w.scalar[LOAD] ** 2 + sprung)
     size = ti.max(ti.min(impulse, ti.sqrt(change) + w.scalar[WEIGHT]), w.scalar[NOISE])
     w.scalar[SIZE] = size
-    w.scalar[RESIDUAL] = ti.sqrt(residual) / ti.max(size, 1e-150)
+    # In single precision a literal below 1e-38 would be zero.
+    w.scalar[RESIDUAL] = ti.sqrt(residual) / ti.max(size, 1e-30)
     if ti.sqrt(residual) <= tolerance * size:
         w.scalar[DONE] = 1.0
 

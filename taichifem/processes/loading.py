@@ -26,6 +26,14 @@ class Loading:
         """The part of each load that acts at `time` [s]."""
         return [group.load.share_at(time) for group in self._groups]
 
+    def jumps(self, before: float, after: float) -> bool:
+        """Does some load set in at once, or end, between the steps that end at these times [s]?"""
+        for load in (group.load for group in self._groups):
+            acted, acts = load.share_at(before) > 0, load.share_at(after) > 0
+            if acted != acts and not (acts and load.ramp > 0):
+                return True
+        return False
+
     def forces(self, share: Callable[[Load], float], positions: np.ndarray | None = None) -> np.ndarray:
         """Forces (n,3) [N]; share: the part of a load that acts; positions (n,3) [m], None for those at rest."""
         total = np.zeros_like(self._rest)

@@ -55,3 +55,88 @@ def test_nearest_rotation_from_a_cold_start(precision, error):
         gap = s[1] + s[2] * np.sign(np.linalg.det(F[k]))
         assert gap > 0
         np.testing.assert_allclose(R, by_svd(F[k]), atol=error * max(1, s[0] / gap))
+
+
+QUICK_CASES = {
+    "identity": np.eye(3),
+    "nothing": np.zeros((3, 3)),
+    "first column zero": np.diag([0.0, 2.0, 0.5]),
+    "last column zero": np.diag([1.5, 2.0, 0.0]),
+    "parallel columns": np.array([[1.0, 2.0, 0.3], [2.0, 4.0, -1.0], [-1.0, -2.0, 0.5]]),
+    "nearly parallel columns": np.array([[1.0, 2.0, 0.3], [2.0, 4.0 + 1e-4, -1.0], [-1.0, -2.0, 0.5]]),
+    "first axis along x": np.array([[3.0, 3.0, 1.0], [0.0, 0.0, 1.0], [0.0, 0.0, 1.0]]),
+    "tiny": 1e-12 * np.diag([1.0, -2.0, 3.0]),
+    "inverted": np.diag([1.0, 1.0, -1.0]),
+}
+
+
+def orthonormal(F: np.ndarray, precision: str) -> np.ndarray:
+    """`rotation.orthonormal` of the gradients (n,d,d)."""
+    runtime.start()
+    real, d = runtime.PRECISIONS[precision], F.shape[-1]
+    source, result = ti.Matrix.field(d, d, real, len(F)), ti.Matrix.field(d, d, real, len(F))
+    source.from_numpy(F.astype(np.float32 if precision == "f32" else np.float64))
+
+    @ti.kernel
+    def run():
+        for i in source:
+            result[i] = rotation.orthonormal(source[i])
+
+    with runtime.precision_of(precision):
+        run()
+    return result.to_numpy().astype(float)
+
+
+@pytest.mark.parametrize(("precision", "error"), [("f32", 2e-6), ("f64", 1e-14)])
+@pytest.mark.parametrize("d", [2, 3])
+def test_quick_rotation_is_proper_for_every_gradient(d, precision, error):
+    F = np.concatenate([gradients(), list(QUICK_CASES.values())])[:, :d, :d]
+    got = orthonormal(F, precision)
+    np.testing.assert_allclose(got.transpose(0, 2, 1) @ got, np.tile(np.eye(d), (len(F), 1, 1)), atol=error)
+    np.testing.assert_allclose(np.linalg.det(got), 1, atol=error)
+
+
+@pytest.mark.parametrize("d", [2, 3])
+def test_quick_rotation_keeps_the_first_edge(d):
+    """R^T F is upper triangular with a first entry above zero: the first edge keeps its direction."""
+    F = gradients()[:, :d, :d]
+    upper = orthonormal(F, "f64").transpose(0, 2, 1) @ F
+    assert (upper[:, 0, 0] > 0).all()
+    np.testing.assert_allclose(upper[:, *np.tril_indices(d, -1)], 0, atol=1e-10)
+    if d == 3:
+        assert (upper[:, 1, 1] >= 0).all()
+
+
+@pytest.mark.parametrize("d", [2, 3])
+def test_quick_rotation_is_the_polar_one_for_stretch_along_the_axes(d):
+    rng = np.random.default_rng(8)
+    turns = np.array([np.eye(3) if d == 2 else random_rotation(rng) for _ in range(50)])[:, :d, :d]
+    if d == 2:
+        c, s = np.cos(np.arange(50)), np.sin(np.arange(50))
+        turns = np.array([[c, -s], [s, c]]).transpose(2, 0, 1)
+    got = orthonormal(turns * rng.uniform(0.1, 3.0, size=(50, 1, d)), "f64")
+    np.testing.assert_allclose(got, turns, atol=1e-13)
+
+
+@pytest.mark.parametrize(("precision", "error"), [("f32", 1e-6), ("f64", 1e-14)])
+def test_nearest_rotation_in_the_plane(precision, error):
+    """Against the singular value decomposition; where all rotations are as near, the identity."""
+    runtime.start()
+    real = runtime.PRECISIONS[precision]
+    F = np.concatenate([gradients()[:, :2, :2], [np.zeros((2, 2)), np.diag([1.0, -1.0])]])
+    source, result = ti.Matrix.field(2, 2, real, len(F)), ti.Matrix.field(2, 2, real, len(F))
+    source.from_numpy(F.astype(np.float32 if precision == "f32" else np.float64))
+
+    @ti.kernel
+    def run():
+        for i in source:
+            result[i] = rotation.nearest_rotation_2d(source[i])
+
+    with runtime.precision_of(precision):
+        run()
+    got = result.to_numpy().astype(float)
+    np.testing.assert_array_equal(got[-2:], [np.eye(2), np.eye(2)])
+    for f, R in zip(F[:-2], got[:-2], strict=True):
+        u, s, vt = np.linalg.svd(f)
+        sign = np.sign(np.linalg.det(f))
+        np.testing.assert_allclose(R, u @ np.diag([1, sign]) @ vt, atol=error * s[0] / (s[0] + sign * s[1]) + error)
