@@ -126,10 +126,12 @@ def restrict(w: ti.template(), g: ti.i32):
 @ti.func
 def solve_row(w: ti.template(), n: ti.i32, a: ti.i32):
     """Row a of the inverse times the restricted residual, to `w.coarse_solution`."""
-    total = ti.cast(0.0, w.real)
-    for b in range(6 * n):
-        total += w.coarse_inverse[a, b] * w.coarse_residual[b]
-    w.coarse_solution[a] = total
+    # Six sums that do not wait for each other.
+    sums = ti.Vector.zero(w.real, 6)
+    for g in range(n):
+        for k in ti.static(range(6)):
+            sums[k] += w.coarse_inverse[a, 6 * g + k] * w.coarse_residual[6 * g + k]
+    w.coarse_solution[a] = sums.sum()
 
 
 @ti.func
