@@ -29,7 +29,8 @@ def _half_way(w: ti.template(), n: ti.i32, h: ti.f64):
 @ti.kernel
 def _remember(w: ti.template(), n: ti.i32, h: ti.f64):
     for i in range(n):
-        w.past_v[i] = (w.v[i] - w.base_v[i]) / ti.cast(h, w.real)
+        # What is held goes as it is told: its jerks would swing on in it, and burst out where it is let go.
+        w.past_v[i] = w.free[i] * (w.v[i] - w.base_v[i]) / ti.cast(h, w.real)
 
 
 def advance(step: Step) -> StepReport:

@@ -1,0 +1,45 @@
+"""Bodies twisted, flattened and scrambled beyond all measure find their rest shape again, in single precision."""
+
+import numpy as np
+import pytest
+from motions import rigid_misfit
+
+import taichifem as tf
+
+BAR, BALL = tf.TetMesh.bar(size=(0.8, 0.2, 0.2), cells=(8, 2, 2)), tf.TetMesh.sphere(radius=0.2, resolution=2)
+
+
+def twist(x: np.ndarray) -> np.ndarray:
+    """Two whole turns from one end of the bar to the other."""
+    angle = 4 * np.pi * x[:, 0] / 0.8
+    y, z = x[:, 1] - 0.1, x[:, 2] - 0.1
+    cosine, sine = np.cos(angle), np.sin(angle)
+    return np.column_stack([x[:, 0], cosine * y - sine * z, sine * y + cosine * z])
+
+
+def flatten(x: np.ndarray) -> np.ndarray:
+    return x * [1, 1, 0]
+
+
+def scramble(x: np.ndarray) -> np.ndarray:
+    return np.random.default_rng(4).uniform(-0.3, 0.3, size=x.shape)
+
+
+def to_a_point(x: np.ndarray) -> np.ndarray:
+    return np.zeros_like(x)
+
+
+@pytest.mark.parametrize("model", ["corotational", pytest.param("invertible", marks=pytest.mark.slow)])
+@pytest.mark.parametrize(
+    ("mesh", "change"),
+    [(BAR, twist), (BALL, flatten), (BALL, scramble), (BALL, to_a_point)],
+    ids=["twisted bar", "flat ball", "scrambled ball", "ball in a point"],
+)
+def test_the_rest_shape_comes_back(mesh, change, model):
+    material = tf.Material(model=model, wraps="neo-hookean", youngs=1e5, poisson=0.3, stiffness_damping=0.01)
+    simulation = tf.Simulation(tf.Scene(bodies=[tf.Body(mesh=mesh, material=material)], gravity=(0, 0, 0)))
+    simulation.set_positions(change(simulation.rest_positions))
+    for _ in range(30):
+        simulation.advance(seconds=0.1)
+        assert np.isfinite(simulation.positions).all()
+    assert rigid_misfit(mesh.points, simulation.positions) < 1e-3
