@@ -285,11 +285,7 @@ class Simulation(Bodies):
         )
 
     def save(self, path: str | os.PathLike) -> None:
-        """Write everything the next steps depend on; see `load`. Raises InputError if it cannot be written.
-
-        What the solver has learnt is not written but forgotten, here as there, so that both runs go on alike.
-        """
-        self._space.forget()
+        """Write everything the next steps depend on; see `load`. Raises InputError if it cannot be written."""
         w, n, m = self._world, self._counts.nodes, self._counts.elements
         with self._kernels():
             arrays = {
@@ -299,6 +295,7 @@ class Simulation(Bodies):
                 "rotation": transfer.read(w, w.rotation, m),
                 "plastic": transfer.read(w, w.plastic, m),
                 **transfer.read_contacts(w, self._counts.colliders, n),
+                **self._space.state(),
             }
             if self._integrator_remembers:
                 arrays |= {name: transfer.read(w, getattr(w, name), n) for name in PAST}
@@ -321,9 +318,10 @@ class Simulation(Bodies):
                 transfer.write(w, getattr(w, name), arrays[name])
             transfer.write_contacts(w, arrays)
         self._clock, self._fresh = clock, bool(header["fresh"])
-        self._space.forget()
         self._surroundings.forget()
         self._surround(self.time, self.dt)
+        with self._kernels():
+            self._space.restore(arrays)
         self._stats = self._loaded = None
 
     @property

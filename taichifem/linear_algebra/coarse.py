@@ -102,9 +102,9 @@ def _set_inverse(w: ti.template(), inverse: ti.types.ndarray()):
 
 
 @ti.kernel
-def _get_matrix(w: ti.template(), matrix: ti.types.ndarray()):
+def _get(field: ti.template(), matrix: ti.types.ndarray()):
     for a, b in ti.ndrange(matrix.shape[0], matrix.shape[1]):
-        matrix[a, b] = w.coarse[a, b]
+        matrix[a, b] = field[a, b]
 
 
 @ti.func
@@ -153,7 +153,7 @@ class Coarse:
     """The coarse space of a world: knows when to renew the inverse."""
 
     def __init__(self, w: World, aggregates: Aggregates) -> None:
-        self.count = aggregates.count
+        self.count, self._nodes = aggregates.count, len(aggregates.of)
         self._w = w
         self._reference: int | None = None
         self._solves = 0
@@ -162,6 +162,35 @@ class Coarse:
     def forget(self) -> None:
         """Renew the inverse at the next solve: pins or the method's matrix have changed."""
         self._reference = None
+
+    def state(self) -> dict[str, np.ndarray]:
+        """What the next solves depend on, for a checkpoint; see `restore`."""
+        learnt = np.array([-1 if self._reference is None else self._reference, self._solves])
+        if not self.count:
+            return {"coarse_learnt": learnt}
+        w = self._w
+        inverse = np.empty((6 * self.count, 6 * self.count), transfer.dtype_of(w))
+        _get(w.coarse_inverse, inverse)
+        arm = transfer.read(w, w.arm, self._nodes)
+        turn, reach = transfer.read(w, w.turn, self.count), transfer.read(w, w.reach, self.count)
+        return {
+            "coarse_learnt": learnt,
+            "coarse_inverse": inverse,
+            "coarse_arm": arm,
+            "coarse_turn": turn,
+            "coarse_reach": reach[:, None],
+        }
+
+    def restore(self, arrays: dict[str, np.ndarray]) -> None:
+        """The inverse of `state`."""
+        reference, self._solves = (int(value) for value in arrays["coarse_learnt"])
+        self._reference = None if reference < 0 else reference
+        if self.count:
+            w = self._w
+            _set_inverse(w, arrays["coarse_inverse"])
+            transfer.write(w, w.arm, arrays["coarse_arm"])
+            transfer.write(w, w.turn, arrays["coarse_turn"])
+            w.reach.from_numpy(np.resize(arrays["coarse_reach"][:, 0], w.reach.shape))
 
     def prepare(self) -> int:
         """Make ready for a solve with the matrix as it stands; returns the number of aggregates in use."""
@@ -185,7 +214,7 @@ class Coarse:
 
     def _invert(self) -> None:
         matrix = np.empty((6 * self.count, 6 * self.count))
-        _get_matrix(self._w, matrix)
+        _get(self._w.coarse, matrix)
         # A motion that no node can follow (all pinned, or all in a line) has a zero diagonal: it is left out.
         diagonal = matrix.diagonal().copy()
         use = diagonal > 1e-9 * diagonal.max()

@@ -25,8 +25,9 @@ TWO = ["--vary", "model=linear,corotational"]
 class FakeSimulation:
     """Counts steps; its energy grows by a joule a step, half of it kinetic. `last`: steps before it diverges."""
 
-    def __init__(self, last: int | None = None, **scene) -> None:
+    def __init__(self, last: int | None = None, substeps: int = 1, **scene) -> None:
         mesh = TetMesh.bar(size=(1, 1, 1), cells=(1, 1, 1))
+        self.substeps = substeps
         self.scene, self.last, self.done = Scene(bodies=[Body(mesh=mesh)], **scene), last, 0
         self.rest_positions, self.cells = mesh.points, mesh.cells
 
@@ -37,11 +38,14 @@ class FakeSimulation:
 
     @property
     def frame(self) -> int:
-        return self.done // self.scene.substeps
+        return self.done // self.substeps
 
     @property
     def time(self) -> float:
-        return self.done / (self.scene.fps * self.scene.substeps)
+        return self.done / (self.scene.fps * self.substeps)
+
+    def critical_step(self) -> float:
+        return math.inf
 
     @property
     def phases(self) -> dict:
