@@ -27,7 +27,14 @@ SHEET = tf.TriMesh.rectangle(size=(0.6, 0.3), cells=(6, 3))
 LOOSE = 50
 
 
-@pytest.fixture(scope="module", params=[(law, d) for law in ALL for d in (2, 3)], ids=lambda p: f"{p[0]}-{p[1]}d")
+def marked(law: str, *values):
+    """A law that wraps another costs a compilation more, and `tests/formulas` has its derivatives."""
+    return pytest.param(*values, marks=pytest.mark.slow if law.startswith("invertible ") else ())
+
+
+@pytest.fixture(
+    scope="module", params=[marked(law, (law, d)) for law in ALL for d in (2, 3)], ids=lambda p: f"{p[0]}-{p[1]}d"
+)
 def simulation(request):
     """A mesh and 50 elements apart, of one law; this integrator asks for the exact tangents of all."""
     law, d = request.param
@@ -87,7 +94,7 @@ def test_forces_turn_with_the_body(simulation):
 
 
 @pytest.mark.parametrize("d", [2, 3])
-@pytest.mark.parametrize("law", [law for law, m in ALL.items() if m.model != "mass-spring"])
+@pytest.mark.parametrize("law", [marked(law, law) for law, m in ALL.items() if m.model != "mass-spring"])
 def test_small_strains_obey_hooke(law, d):
     """At rest the tangent is that of linear elasticity."""
     tangents = []

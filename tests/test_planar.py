@@ -41,7 +41,9 @@ def simulate(mesh, material=None, *, thickness=THICKNESS, precision="f64", **sce
     return tf.Simulation(tf.Scene(bodies=[body], **({"gravity": (0, 0, 0)} | scene)), precision=precision)
 
 
-@pytest.mark.parametrize("law", LAWS)
+@pytest.mark.parametrize(
+    "law", [law if law in ("linear", "neo-hookean") else pytest.param(law, marks=pytest.mark.slow) for law in LAWS]
+)
 def test_a_sheet_is_a_layer_held_at_its_thickness(law):
     """Energy, forces, stress (across the plane too) and von Mises stress, with some elements turned inside out.
 
@@ -126,7 +128,9 @@ def test_a_resting_sheet_rests():
     assert (before @ plane.normal).min() > -1e-3
 
 
-@pytest.mark.parametrize("model", ["corotational", "invertible", "neo-hookean"])
+@pytest.mark.parametrize(
+    "model", ["corotational", *(pytest.param(m, marks=pytest.mark.slow) for m in ("invertible", "neo-hookean"))]
+)
 def test_scrambled_and_crushed_sheets_recover(model):
     """All nodes at random, or squeezed to a line: the rest shape comes back in single precision, without a NaN."""
     material = tf.Material(model=model, wraps="corotational", stiffness_damping=0.02, **MODULI)

@@ -98,7 +98,14 @@ def test_a_network_holds_no_volume_and_heeds_no_poisson_ratio():
     np.testing.assert_allclose(first.elastic_forces(), second.elastic_forces(), rtol=1e-9, atol=1e-6)
 
 
-@pytest.mark.parametrize("integrator", ["backward-euler", "backward-euler-newton", "symplectic-euler", "bdf2"])
+@pytest.mark.parametrize(
+    "integrator",
+    [
+        "backward-euler",
+        "symplectic-euler",
+        *(pytest.param(i, marks=pytest.mark.slow) for i in ("backward-euler-newton", "bdf2")),
+    ],
+)
 def test_damping_keeps_momenta_and_takes_energy(integrator):
     """It acts along the springs: a turning network stays as it is, an oscillating one loses energy and nothing else."""
     scene = {"integrator": integrator, "fps": 200, "tolerance": 1e-8, "newton_tolerance": 1e-10}

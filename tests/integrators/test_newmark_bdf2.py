@@ -44,7 +44,7 @@ def exact():
     [
         ("newmark", 2, 100),
         ("bdf2", 2, 100),
-        ("backward-euler", 1, 800),
+        pytest.param("backward-euler", 1, 800, marks=pytest.mark.slow),
         pytest.param("backward-euler-newton", 1, 800, marks=pytest.mark.slow),
     ],
 )
