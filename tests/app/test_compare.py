@@ -27,8 +27,11 @@ class FakeSimulation:
 
     def __init__(self, last: int | None = None, **scene) -> None:
         mesh = TetMesh.bar(size=(1, 1, 1), cells=(1, 1, 1))
-        self.scene, self.last, self.done = Scene(bodies=[Body(mesh=mesh)], **scene), last, 0
+        self.scene, self.last, self.done = Scene(bodies=[Body(mesh=mesh)], **{"substeps": 1} | scene), last, 0
         self.rest_positions, self.cells = mesh.points, mesh.cells
+
+    def critical_step(self) -> float:
+        return math.inf
 
     def step(self) -> None:
         if self.done == self.last:
