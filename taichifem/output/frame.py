@@ -192,7 +192,7 @@ def hud_lines(simulation: Any) -> tuple[str, ...]:
         f"t = {simulation.time:.2f} s",
         f"{stats.get('elements', 0):,} {elements}, {stats.get('nodes', 0):,} nodes",
     ]
-    if cost > 0:
+    if cost > 0 and stats.get("step") != 1:  # the first step also compiles
         solver = f", {stats['iterations']} iterations" if stats.get("iterations") else ""
         lines.append(f"{cost:.2g} ms a step{solver}" if cost < 1 else f"{cost:.1f} ms a step{solver}")
     return tuple(lines)

@@ -13,7 +13,7 @@ from taichifem.output.frame import Frame
 _INK = (38, 44, 54)
 _PAPER = (255, 255, 255)
 _PAPER_OPACITY = 150
-_SMALLEST = 9  # letters [pixels]
+_SMALLEST, _LEGIBLE = 9, 11  # letters [pixels]: where there is no room for more, and where there is
 
 _PREFIXES = ((1e9, "G"), (1e6, "M"), (1e3, "k"), (1.0, ""), (1e-3, "m"), (1e-6, "u"), (1e-9, "n"))
 
@@ -141,7 +141,7 @@ def stamp(picture: np.ndarray, text: str, *, size: int, middle: tuple[float, flo
 def annotate(picture: np.ndarray, frame: Frame) -> np.ndarray:
     """Write the frame's text and colour bar into `picture` (height,width,3) uint8, in place."""
     height, width = picture.shape[:2]
-    size = int(np.clip(round(min(height, 0.75 * width) / 42), _SMALLEST, 40))
+    size = int(np.clip(round(min(height, 0.75 * width) / 42), _LEGIBLE, 40))
     margin = size
     if frame.hud:
         _blend(picture, _text_panel(tuple(frame.hud), size), margin, margin)

@@ -161,18 +161,17 @@ def triangle_light(
     normal /= ti.max(normal.norm(), 1e-30)
     light = surface_light(shadow, nearest, occlusion, look, reach, p, direction, normal, albedo, thing < look.thin)
     if thing < look.wired:
-        corners = ti.Matrix.rows([xyw(project(view, a)), xyw(project(view, b)), xyw(project(view, c))])
-        closest, least = 1e9, 1e9
-        for k in ti.static(range(3)):
-            slope = samples * ti.max(ti.sqrt(e[k, 0] * e[k, 0] + e[k, 1] * e[k, 1]), 1e-30)
-            closest = ti.min(closest, across[k] / slope)
-            if corners[k, 2] > 0:
-                opposite = e[k, 0] * corners[k, 0] + e[k, 1] * corners[k, 1] + e[k, 2] * corners[k, 2]
-                least = ti.min(least, opposite / (corners[k, 2] * slope))
-        line = ti.math.clamp(0.5 * look.wire_width + 0.5 - closest, 0.0, 1.0)
-        # Where triangles are hardly wider than lines, these would only darken.
-        line *= ti.math.smoothstep(1.5, 6.0, least / look.wire_width)
-        light = ti.math.mix(light, line_light(light, albedo), line)
+        slope = samples * ti.sqrt(ti.max(e[:, 0] ** 2 + e[:, 1] ** 2, 1e-30))
+        line = ti.math.clamp(0.5 * look.wire_width + 0.5 - (across / slope).min(), 0.0, 1.0)
+        if line > 0:
+            corners = ti.Matrix.cols([xyw(project(view, a)), xyw(project(view, b)), xyw(project(view, c))])
+            least = 1e9
+            for k in ti.static(range(3)):
+                if corners[2, k] > 0:
+                    least = ti.min(least, e[k, :].dot(corners[:, k]) / (corners[2, k] * slope[k]))
+            # Where triangles are hardly wider than lines, these would only darken.
+            line *= ti.math.smoothstep(1.5, 6.0, least / look.wire_width)
+            light = ti.math.mix(light, line_light(light, albedo), line)
     return light
 
 
