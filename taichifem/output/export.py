@@ -77,7 +77,7 @@ def _safe(name: str) -> str:
 
 def write_vtu(path: Path, simulation: Any, **point_data: np.ndarray) -> None:
     """Write the state of `simulation` as a .vtu file: displacement, velocity, stress, bodies, and further node data."""
-    points, kind = simulation.positions, "tetra" if simulation.dimension == 3 else "triangle"
+    points, kind = simulation.positions, "tetra" if simulation.cells.shape[1] == 4 else "triangle"
     meshio.Mesh(
         points,
         [(kind, simulation.cells)],
