@@ -87,6 +87,7 @@ def test_newmark_keeps_energy(model):
     assert np.abs(np.array(energies) / energies[0] - 1).max() < 0.01
 
 
+@pytest.mark.slow
 def test_bdf2_loses_less_than_backward_euler_and_never_gains():
     lost = {}
     for integrator in ("bdf2", "backward-euler-newton"):

@@ -18,7 +18,7 @@ def simulate(mesh=BAR, *, material=None, body=None, precision="f64", **scene) ->
     return tf.Simulation(tf.Scene(bodies=bodies, **chosen), precision=precision)
 
 
-@pytest.mark.parametrize("mesh", [BAR, STRIP], ids=["3d", "2d"])
+@pytest.mark.parametrize("mesh", [BAR, pytest.param(STRIP, marks=pytest.mark.slow)], ids=["3d", "2d"])
 def test_slow_motions_end_in_the_shape_of_a_long_damped_run(mesh):
     """A pin turns one end and a handle pulls at its middle while gravity acts."""
     motion = tf.Motion(times=(0, 0.5), angle=(0, 40), axis=(0, 1, 0), center=(0.8, 0.1, 0.1))

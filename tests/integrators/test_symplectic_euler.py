@@ -102,7 +102,7 @@ def test_one_degree_of_freedom(damping):
     assert simulation.positions[3, 2] == pytest.approx(1 + u, abs=1e-12)
 
 
-@pytest.mark.parametrize("model", ["linear", "stvk"])
+@pytest.mark.parametrize("model", ["linear", pytest.param("stvk", marks=pytest.mark.slow)])
 def test_energy_stays_bounded(model):
     """Neither grows nor fades over 1e4 steps at 0.9 of the critical step."""
     check_energy(model, 10_000)
