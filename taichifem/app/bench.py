@@ -5,22 +5,18 @@ from __future__ import annotations
 import json
 import math
 import os
-import platform
 import subprocess
 import sys
 import tempfile
-import time
 from dataclasses import asdict
 from pathlib import Path
 
 import click
 
-from taichifem import __version__
 from taichifem.app.bench_report import print_report
 from taichifem.app.bench_worker import Bar
-from taichifem.app.info import machine, versions
+from taichifem.app.figures import write_figures
 from taichifem.errors import InputError
-from taichifem.files import replacing
 
 CACHE = "TI_OFFLINE_CACHE_FILE_PATH"
 MOST_TETS = 5_000_000
@@ -51,7 +47,7 @@ def run_bench(
     counts = {text: _tets(text) for text in sizes.split(",")}
     moduli = [_modulus(text) for text in stiffness.split(",")]
     if json_file is not None:
-        _write_json(json_file, settings, [])  # a place that cannot be written is told now
+        write_figures(json_file, settings, [])  # a place that cannot be written is told now
     rows = []
     for label, tets in counts.items():
         m = max(1, round((tets / 20) ** (1 / 3)))
@@ -67,7 +63,7 @@ def run_bench(
                     figures[f"cold_{name}"] = cold.get(name)
                 rows.append({"size": label.strip(), **asdict(bar), **figures})
         if json_file is not None:
-            _write_json(json_file, settings, rows)
+            write_figures(json_file, settings, rows)
     print_report(rows)
     return rows
 
@@ -106,17 +102,3 @@ def _measure(bar: Bar, environment: dict[str, str], what: str) -> dict:
         reason = next(reversed(done.stderr.strip().splitlines()), f"it ended with code {done.returncode}")
         raise InputError(f"bench of {what}: {reason}")
     return json.loads(done.stdout.strip().splitlines()[-1])
-
-
-def _write_json(path: Path, settings: dict, rows: list[dict]) -> None:
-    content = {
-        "taichifem": __version__,
-        "python": platform.python_version(),
-        "date": time.strftime("%Y-%m-%dT%H:%M:%S%z"),
-        "versions": dict(versions()),
-        "machine": dict(machine()),
-        "settings": settings,
-        "rows": rows,
-    }
-    with replacing(path) as part:
-        part.write_text(json.dumps(content, indent=2) + "\n", encoding="utf-8")

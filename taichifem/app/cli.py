@@ -189,7 +189,7 @@ def info() -> None:
 @click.option("--budget", type=float, default=45.0, show_default=True, help="Seconds for them, at most.")
 @click.option("--no-cold", is_flag=True, help="Leave out the start with an empty kernel cache.")
 @click.option("--json", "json_file", type=FILE, metavar="FILE", help="Write all figures to this file, too.")
-@machine_options
+@machine_options()
 def bench(**options: Any) -> None:
     """Measure speed, start-up and memory.
 

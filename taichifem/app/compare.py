@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import re
-import tempfile
 from collections.abc import Sequence
 from contextlib import nullcontext
 from dataclasses import dataclass
@@ -11,12 +10,14 @@ from pathlib import Path
 
 import click
 
-from taichifem.app.compare_report import print_report, write_json
+from taichifem.app.compare_report import print_report
 from taichifem.app.compare_run import Run
 from taichifem.app.compare_video import SideBySide
 from taichifem.app.demos import find_demo
+from taichifem.app.figures import write_figures
 from taichifem.app.starting import start_taichi
 from taichifem.errors import InputError
+from taichifem.files import need_place
 from taichifem.output.progress import ProgressReport
 from taichifem.output.tiles import Grid
 from taichifem.scene import read_scene
@@ -82,7 +83,7 @@ def run_compare(scene: str, options: CompareOptions) -> Comparison:
         except InputError as error:
             raise InputError(f"--vary {key}={value}: {error}") from None
     if options.json_file is not None:
-        _need_place(options.json_file)
+        need_place(options.json_file)
     rate = max(one.fps for one in scenes)
     pictures = None if grid is None else SideBySide(options.video, rate, runs, grid)
     with pictures or nullcontext():
@@ -92,7 +93,7 @@ def run_compare(scene: str, options: CompareOptions) -> Comparison:
     if options.json_file is not None:
         settings = {"scene": str(file), "key": key, "values": values, "overrides": overrides}
         settings |= {name: getattr(options, name) for name in ("arch", "threads", "precision")}
-        write_json(options.json_file, settings, rows)
+        write_figures(options.json_file, settings, rows)
     for written in (pictures and pictures.path, options.json_file):
         if written is not None:
             click.echo(f"wrote {written}")
@@ -140,12 +141,3 @@ def _advance(runs: Sequence[Run], rate: float, pictures: SideBySide | None) -> b
         except KeyboardInterrupt:
             return True
     return False
-
-
-def _need_place(file: Path) -> None:
-    """Tell now, not at the end of a long run, that a file cannot be written."""
-    try:
-        file.parent.mkdir(parents=True, exist_ok=True)
-        tempfile.TemporaryFile(dir=file.parent).close()
-    except OSError as error:
-        raise InputError(f"{file}: cannot be written: {error.strerror}: choose another place") from None

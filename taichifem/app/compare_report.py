@@ -2,15 +2,7 @@
 
 from __future__ import annotations
 
-import json
-import platform
-import time
-from pathlib import Path
-
-from taichifem import __version__
 from taichifem.app.console import console, table
-from taichifem.app.info import machine, versions
-from taichifem.files import replacing
 
 EXPLANATION = (
     "ms a step, iterations a step: medians, taken in turns on the same machine; the first step, which also compiles, "
@@ -41,18 +33,3 @@ def print_report(rows: list[dict]) -> None:
     screen.print()
     for line in EXPLANATION:
         screen.print(line)
-
-
-def write_json(path: Path, settings: dict, rows: list[dict]) -> None:
-    """Write all figures. Raises InputError if that fails."""
-    content = {
-        "taichifem": __version__,
-        "python": platform.python_version(),
-        "date": time.strftime("%Y-%m-%dT%H:%M:%S%z"),
-        "versions": dict(versions()),
-        "machine": dict(machine()),
-        "settings": settings,
-        "rows": rows,
-    }
-    with replacing(path) as part:
-        part.write_text(json.dumps(content, indent=2, allow_nan=False) + "\n", encoding="utf-8")

@@ -45,29 +45,43 @@ def together(*decorators: Callable) -> Callable:
     return decorate
 
 
-machine_options = together(
-    click.option("--arch", type=click.Choice(ARCHES), help="What to compute on.  [default: cpu]"),
-    click.option("--threads", type=click.IntRange(min=1), metavar="N", help="CPU threads.  [default: all cores]"),
-    click.option(
-        "--precision", type=click.Choice(PRECISIONS), default="f32", show_default=True, help="Of all numbers."
-    ),
+def machine_options(precision: str = "f32") -> Callable:
+    """What to compute on, and in which precision unless told otherwise."""
+    return together(
+        click.option("--arch", type=click.Choice(ARCHES), help="What to compute on.  [default: cpu]"),
+        click.option("--threads", type=click.IntRange(min=1), metavar="N", help="CPU threads.  [default: all cores]"),
+        click.option(
+            "--precision", type=click.Choice(PRECISIONS), default=precision, show_default=True, help="Of all numbers."
+        ),
+    )
+
+
+set_option = click.option(
+    "--set",
+    "overrides",
+    multiple=True,
+    metavar="KEY=VALUE",
+    help="Change the scene, as in body.0.material.youngs=2e5. May be given again.",
 )
+seconds_option = click.option(
+    "--seconds", type=float, metavar="T", help="Run until this simulated time [s].  [default: the scene's]"
+)
+fps_option = click.option(
+    "--fps", type=float, metavar="F", help="Frames a second; the time step follows.  [default: the scene's]"
+)
+size_option = click.option(
+    "--size", type=Size(), metavar="WxH", default="1280x720", show_default=True, help="Of the picture [pixels]."
+)
+renderer_option = click.option(
+    "--renderer", type=click.Choice(RENDERERS), default="auto", show_default=True, help="Who draws."
+)
+quiet_option = click.option("-q", "--quiet", is_flag=True, help="Print nothing but errors.")
 
 run_options = together(
-    click.option(
-        "--set",
-        "overrides",
-        multiple=True,
-        metavar="KEY=VALUE",
-        help="Change the scene, as in body.0.material.youngs=2e5. May be given again.",
-    ),
-    click.option(
-        "--seconds", type=float, metavar="T", help="Run until this simulated time [s].  [default: the scene's]"
-    ),
+    set_option,
+    seconds_option,
     click.option("--frames", type=click.IntRange(min=1), metavar="N", help="Run until this frame instead."),
-    click.option(
-        "--fps", type=float, metavar="F", help="Frames a second; the time step follows.  [default: the scene's]"
-    ),
+    fps_option,
     click.option(
         "-o",
         "--output",
@@ -76,10 +90,8 @@ run_options = together(
         help="Video: .mp4, .gif, .webp, or numbered .png.  [default: out/NAME.mp4]",
     ),
     click.option("--no-video", is_flag=True, help="Draw nothing."),
-    click.option(
-        "--size", type=Size(), metavar="WxH", default="1280x720", show_default=True, help="Of the picture [pixels]."
-    ),
-    click.option("--renderer", type=click.Choice(RENDERERS), default="auto", show_default=True, help="Who draws."),
+    size_option,
+    renderer_option,
     click.option("--color", type=click.Choice(COLORS), help="What colours show.  [default: the scene's]"),
     click.option("--wire/--no-wire", default=None, help="Draw the edges of elements, or do not."),
     click.option(
@@ -93,8 +105,8 @@ run_options = together(
     click.option("--checkpoint", type=FILE, metavar="FILE", help="Write the state at the end and on Ctrl-C."),
     click.option("--checkpoint-every", type=click.IntRange(min=1), metavar="N", help="... and every N frames."),
     click.option("--resume", type=FILE, metavar="FILE", help="Go on from a checkpoint of the same scene."),
-    machine_options,
-    click.option("-q", "--quiet", is_flag=True, help="Print nothing but errors."),
+    machine_options(),
+    quiet_option,
 )
 
 compare_options = together(
@@ -110,49 +122,25 @@ compare_options = together(
         metavar="FILE",
         help="All choices side by side: .mp4, .gif, .webp, or numbered .png.  [default: draw nothing]",
     ),
-    click.option(
-        "--set",
-        "overrides",
-        multiple=True,
-        metavar="KEY=VALUE",
-        help="Change the scene for every choice, as in body.0.material.youngs=2e5. May be given again.",
-    ),
-    click.option(
-        "--seconds", type=float, metavar="T", help="Run until this simulated time [s].  [default: the scene's]"
-    ),
-    click.option(
-        "--fps", type=float, metavar="F", help="Frames a second; the time step follows.  [default: the scene's]"
-    ),
-    click.option(
-        "--size", type=Size(), metavar="WxH", default="1280x720", show_default=True, help="Of the picture [pixels]."
-    ),
+    set_option,
+    seconds_option,
+    fps_option,
+    size_option,
     click.option("--json", "json_file", type=FILE, metavar="FILE", help="Write all figures to this file, too."),
-    machine_options,
+    machine_options(),
 )
 
 static_options = together(
-    click.option(
-        "--set",
-        "overrides",
-        multiple=True,
-        metavar="KEY=VALUE",
-        help="Change the scene, as in body.0.material.youngs=2e5. May be given again.",
-    ),
+    set_option,
     click.option("--linear", is_flag=True, help="Small strains: every material follows Hooke's law."),
     click.option("--tolerance", type=float, default=1e-9, show_default=True, help="Imbalance relative to the forces."),
     click.option("-o", "--output", type=FILE, metavar="FILE", help="Results on the mesh.  [default: out/NAME.vtu]"),
     click.option("--picture", type=FILE, metavar="FILE", help="Picture of them.  [default: out/NAME.png]"),
     click.option("--no-picture", is_flag=True, help="Draw nothing."),
     click.option("--color", type=click.Choice(COLORS), help="What colours show.  [default: the scene's, or von-mises]"),
-    click.option(
-        "--size", type=Size(), metavar="WxH", default="1280x720", show_default=True, help="Of the picture [pixels]."
-    ),
-    click.option("--renderer", type=click.Choice(RENDERERS), default="auto", show_default=True, help="Who draws."),
+    size_option,
+    renderer_option,
     click.option("--json", "json_file", type=FILE, metavar="FILE", help="Write all figures to this file, too."),
-    click.option("--arch", type=click.Choice(ARCHES), help="What to compute on.  [default: cpu]"),
-    click.option("--threads", type=click.IntRange(min=1), metavar="N", help="CPU threads.  [default: all cores]"),
-    click.option(
-        "--precision", type=click.Choice(PRECISIONS), default="f64", show_default=True, help="Of all numbers."
-    ),
-    click.option("-q", "--quiet", is_flag=True, help="Print nothing but errors."),
+    machine_options("f64"),
+    quiet_option,
 )

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import os
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -11,6 +10,7 @@ import click
 
 from taichifem.app.starting import start_taichi
 from taichifem.errors import InputError
+from taichifem.files import need_place
 from taichifem.output.export import open_export
 from taichifem.output.recorder import Summary, run_recording
 from taichifem.output.renderer import make_renderer
@@ -79,7 +79,7 @@ def run_scene(path: Path, options: RunOptions) -> Summary:
     """Run the scene file and write what the options ask for. Raises InputError for what is wrong."""
     scene = read_scene(path, overrides=options.scene_overrides())
     if options.checkpoint is not None:
-        _need_folder_of(options.checkpoint)
+        need_place(options.checkpoint)
     start_taichi(options.arch, options.threads)
     from taichifem.simulation import Simulation
 
@@ -141,16 +141,6 @@ def _record(simulation: Simulation, frames: int, name: str, options: RunOptions)
 def _default_output(name: str, frame: int) -> Path:
     """A resumed run does not overwrite the video that its first part wrote."""
     return OUT / (f"{name}-from-{frame}.mp4" if frame else f"{name}.mp4")
-
-
-def _need_folder_of(file: Path) -> None:
-    """Tell now, not at the end of a long run, that a file cannot be written."""
-    try:
-        file.parent.mkdir(parents=True, exist_ok=True)
-    except OSError as error:
-        raise InputError(f"{file}: cannot be written ({error.strerror}): choose another place") from None
-    if not os.access(file.parent, os.W_OK):
-        raise InputError(f"{file}: the folder cannot be written to: choose another place")
 
 
 def _dashed(name: str) -> str:
