@@ -13,9 +13,10 @@ from taichifem.integrators import EXACT, symplectic_euler
 from taichifem.laws import Laws
 from taichifem.layout import AXES, Layout, lay_out
 from taichifem.linear_algebra import assembly, balance
-from taichifem.linear_algebra.aggregates import aggregate
-from taichifem.linear_algebra.coarse import Coarse
+from taichifem.linear_algebra.galerkin import Galerkin
+from taichifem.linear_algebra.levels import Levels, stack_levels
 from taichifem.linear_algebra.pattern import BlockPattern, block_pattern
+from taichifem.linear_algebra.program import write_program
 from taichifem.linear_algebra.spectrum import highest_frequency
 from taichifem.processes.loading import Loading
 from taichifem.surroundings import Surroundings, pose
@@ -39,7 +40,9 @@ class Bodies:
         self._materials = list(self._layout.materials)
         self._laws = Laws(self._materials, exact=scene.integrator in EXACT)
         self._loading = Loading(self._layout)
-        self._aggregates = aggregate(self._layout.rest, self._layout.body_start)
+        self._levels: Levels = stack_levels(self._pattern, self._layout.aggregates)
+        self._galerkin = Galerkin(self._layout.aggregates, self._levels) if scene.solver == "multilevel" else None
+        self._program = write_program(len(self._layout.rest), self._layout.aggregates, solver=scene.solver)
         self._generation = runtime.generation
         self._world: World = acquire(self._capacity(), precision, self)
         self._counts = Counts(
@@ -51,7 +54,7 @@ class Bodies:
         )
         with self._kernels():
             transfer.fill(self._world, self._layout, self._pattern)
-            self._space = Coarse(self._world, self._aggregates)
+            transfer.fill_levels(self._world, self._levels, self._layout.aggregates, self._program)
         self._surroundings = Surroundings(scene, self._layout, self._world, self._counts)
         self._gravity = np.asarray(scene.gravity, dtype=float)
 
@@ -68,7 +71,11 @@ class Bodies:
             pulled=1 + sum(len(g.nodes) for g in layout.handles),
             poses=len(layout.pins) + len(layout.handles),
             bodies=len(self.scene.bodies),
-            aggregates=self._aggregates.count,
+            aggregates=layout.aggregates.count,
+            coarse_blocks=len(self._levels.column) - pattern.n_blocks,
+            coarse_pairs=len(self._levels.pair),
+            members=len(self._levels.member),
+            operations=len(self._program),
             dimension=layout.dimension,
             tangents=self._laws.stores_tangents,
             springs=self._laws.springs,
@@ -106,7 +113,7 @@ class Bodies:
             transfer.fill_table(self._world, rows, self._layout.body_start, flies)
             inertia = self.scene.integrator != "quasi-static"
             elements.gather_masses(self._world, self._counts.nodes, self._counts.bodies, inertia)
-        self._space.forget()
+        self._counts.flying = int((flies != balance.HELD).sum())
 
     def _surround(self, time: float, dt: float, *, all_act: bool = False) -> None:
         """Put pins, handles and colliders where they stand at `time` [s]."""
@@ -140,32 +147,32 @@ class Bodies:
     @property
     def rest_positions(self) -> np.ndarray:
         """Rest positions (n,3) [m]."""
-        return self._layout.rest
+        return self._given(self._layout.rest)
 
     @property
     def cells(self) -> np.ndarray:
         """Elements (m,d+1): tetrahedra, or triangles of planar bodies."""
-        return self._layout.cells
+        return self._given_cells(self._layout.node_order[self._layout.cells])
 
     @property
     def cell_bodies(self) -> np.ndarray:
         """Body of each element (m,)."""
-        return self._layout.cell_bodies
+        return self._given_cells(self._layout.cell_bodies)
 
     @property
     def cell_regions(self) -> np.ndarray:
         """Region of each element in its mesh (m,)."""
-        return self._layout.regions
+        return self._given_cells(self._layout.regions)
 
     @property
     def node_bodies(self) -> np.ndarray:
         """Body of each node (n,)."""
-        return self._layout.node_bodies
+        return self._given(self._layout.node_bodies)
 
     @property
     def surface(self) -> np.ndarray:
         """Outward triangles of all bodies (k,3), as node indices; of planar bodies, all their elements."""
-        return self._layout.surface
+        return self._layout.node_order[self._layout.surface]
 
     @property
     def surface_bodies(self) -> np.ndarray:
@@ -174,11 +181,24 @@ class Bodies:
 
     # State
 
+    def _given(self, values: np.ndarray) -> np.ndarray:
+        """Values of the nodes (n,...) in the order of the scene, from that of the layout."""
+        target = np.empty_like(values)
+        target[self._layout.node_order] = values
+        return target
+
+    def _given_cells(self, values: np.ndarray) -> np.ndarray:
+        """Values of the elements (m,...) in the order of the scene, from that of the layout."""
+        target = np.empty_like(values)
+        target[self._layout.cell_order] = values
+        return target
+
     def _read(self, field) -> np.ndarray:
+        """Node or element values in the order of the scene."""
         with self._kernels():
-            per_element = field in (self._world.stress, self._world.energy, self._world.rotation)
-            count = self._counts.elements if per_element else self._counts.nodes
-            return transfer.read(self._world, field, count).astype(np.float64)
+            if field in (self._world.stress, self._world.energy, self._world.rotation):
+                return self._given_cells(transfer.read(self._world, field, self._counts.elements).astype(np.float64))
+            return self._given(transfer.read(self._world, field, self._counts.nodes).astype(np.float64))
 
     @property
     def positions(self) -> np.ndarray:
@@ -210,7 +230,7 @@ class Bodies:
         if not np.isfinite(array).all():
             raise InputError(f"{name} hold NaN or infinity at node {np.argwhere(~np.isfinite(array))[0, 0]}")
         with self._kernels():
-            transfer.write(self._world, field, array)
+            transfer.write(self._world, field, array[self._layout.node_order])
         self._changed()
 
     def _changed(self) -> None:
@@ -238,8 +258,12 @@ class Bodies:
             self._laws.deform(self._world, self._counts, stiffness=1.0, projected=projected)
             assembly.assemble(self._world, self._counts.pairs, 0.0, 0.0)
             blocks = transfer.read(self._world, self._world.block, pattern.n_blocks).astype(np.float64)
-        n = 3 * self._counts.nodes
-        return scipy.sparse.bsr_matrix((blocks, pattern.column, pattern.row_start), shape=(n, n)).tocsr()
+        n, order = 3 * self._counts.nodes, self._layout.node_order
+        row = np.repeat(order, np.diff(pattern.row_start))
+        by_row = np.lexsort((order[pattern.column], row))
+        start = np.r_[0, np.cumsum(np.bincount(row))]
+        matrix = scipy.sparse.bsr_matrix((blocks[by_row], order[pattern.column][by_row], start), shape=(n, n))
+        return matrix.tocsr()
 
     def _measure(self) -> None:
         with self._kernels():
@@ -266,7 +290,7 @@ class Bodies:
         corners = self.positions[self.cells][:, :, AXES[self.dimension]]
         volume = np.linalg.det(corners[:, 1:] - corners[:, :1])
         linear = np.array([m.model == "linear" for m in self._materials])
-        return np.flatnonzero((volume <= 0) & ~linear[self._layout.cell_materials])
+        return np.flatnonzero((volume <= 0) & ~linear[self._given_cells(self._layout.cell_materials)])
 
     def critical_step(self) -> float:
         """The longest stable step [s] of symplectic Euler at the current positions; infinite without stiffness.
@@ -276,7 +300,7 @@ class Bodies:
         """
         held = self._surroundings.held_for_ever
         free = np.ones((self._counts.nodes, 3))
-        np.minimum.at(free, held[:, 0].astype(int), 1.0 - held[:, 2:])
+        np.minimum.at(free, self._layout.node_order[held[:, 0].astype(int)], 1.0 - held[:, 2:])
         frequency = highest_frequency(self.stiffness(projected=True), self.masses, free)
         damping = [max(getattr(m, name) for m in self._materials) for name in ("mass_damping", "stiffness_damping")]
         return symplectic_euler.critical_step(frequency, *damping)

@@ -10,6 +10,7 @@ import numpy as np
 
 from taichifem.description import Body, Handle, Load, Material, Motion, Pin, Region, Scene
 from taichifem.errors import InputError
+from taichifem.linear_algebra.aggregates import Aggregates, aggregate
 
 AXES = {2: [0, 2], 3: [0, 1, 2]}
 """Coordinates that matter to bodies of dimension 2 (in the plane y = 0) and 3."""
@@ -51,6 +52,9 @@ class Layout:
     rest (n,3) [m], velocities (n,3) [m/s], cells (m,d+1), thickness (m,) [m] (1 in space), node_bodies (n,),
     cell_bodies (m,), cell_materials (m,) into `materials`, regions (m,), surface (k,3) triangles to draw, outward,
     surface_bodies (k,), body_start (bodies+1,).
+
+    Nodes are numbered such that those of an aggregate of the solver follow one another, and elements after their
+    nodes: what is used together lies together. node_order (n,), cell_order (m,): the numbers they had in the scene.
     """
 
     dimension: int
@@ -67,6 +71,9 @@ class Layout:
     body_start: np.ndarray
     materials: list[Material]
     material_of: dict[tuple[int, int | None], int]
+    aggregates: Aggregates
+    node_order: np.ndarray
+    cell_order: np.ndarray
     pins: list[Group] = field(default_factory=list)
     handles: list[Group] = field(default_factory=list)
     loads: list[LoadGroup] = field(default_factory=list)
@@ -176,21 +183,35 @@ def lay_out(scene: Scene) -> Layout:
         handles += pulled
         loads += _loads(body, label, points, first)
         body_start.append(first + len(points))
+    points, corners = np.concatenate(rest), np.concatenate(cells).astype(np.int32)
+    aggregates = aggregate(points, np.asarray(body_start))
+    nodes = aggregates.order
+    number = np.empty(len(nodes), dtype=np.int32)
+    number[nodes] = np.arange(len(nodes), dtype=np.int32)
+    corners = number[corners]
+    elements = np.argsort(corners.min(axis=1), kind="stable")
+    for group in (*pins, *handles):
+        group.nodes = number[group.nodes]
+    for load in loads:
+        load.where = number[load.where]
     return Layout(
         dimension=dimension,
-        rest=np.concatenate(rest),
-        velocities=np.concatenate(velocities),
-        cells=np.concatenate(cells).astype(np.int32),
-        thickness=np.concatenate(thickness),
-        node_bodies=np.concatenate(node_bodies),
-        cell_bodies=np.concatenate(cell_bodies),
-        cell_materials=np.concatenate(cell_materials),
-        regions=np.concatenate(regions),
-        surface=np.concatenate(surface).astype(np.int32),
+        rest=points[nodes],
+        velocities=np.concatenate(velocities)[nodes],
+        cells=corners[elements],
+        thickness=np.concatenate(thickness)[elements],
+        node_bodies=np.concatenate(node_bodies)[nodes],
+        cell_bodies=np.concatenate(cell_bodies)[elements],
+        cell_materials=np.concatenate(cell_materials)[elements],
+        regions=np.concatenate(regions)[elements],
+        surface=number[np.concatenate(surface)],
         surface_bodies=np.concatenate(surface_bodies),
         body_start=np.asarray(body_start, dtype=np.int32),
         materials=materials,
         material_of=material_of,
+        aggregates=aggregates,
+        node_order=nodes,
+        cell_order=elements,
         pins=pins,
         handles=handles,
         loads=loads,

@@ -31,6 +31,9 @@ from taichi.lang import impl
 ARCHES = ("cpu", "cuda", "vulkan", "metal")
 PRECISIONS = {"f32": ti.f32, "f64": ti.f64}
 
+OPTIONS = {"make_cpu_multithreading_loop": False}
+"""Left on, Taichi deals loops out to threads in runs of 512 at least, however long one turn takes."""
+
 generation = 0
 """Counts the starts of Taichi: fields made under an earlier number are gone."""
 
@@ -57,9 +60,15 @@ def start(*, arch: str | None = None, threads: int | None = None) -> None:
     options = {} if threads is None else {"cpu_max_num_threads": threads}
     # Taichi prints what it starts on, whatever the log level.
     with contextlib.redirect_stdout(io.StringIO()):
-        ti.init(arch=getattr(ti, arch), log_level=ti.ERROR, offline_cache=True, default_ip=ti.i32, **options)
+        ti.init(arch=getattr(ti, arch), log_level=ti.ERROR, offline_cache=True, default_ip=ti.i32, **OPTIONS, **options)
     _running = (arch, threads)
     generation += 1
+
+
+def threads() -> int:
+    """How many CPU threads kernels run on."""
+    start()
+    return int(impl.current_cfg().cpu_max_num_threads)
 
 
 def _has(arch: str) -> bool:

@@ -118,7 +118,8 @@ class Simulation(Bodies):
             gravity=self._gravity,
             options=Options(**chosen | options),
             timer=self._timer,
-            space=self._space,
+            program=self._program,
+            galerkin=self._galerkin,
             follow=self._follow if self._loading.follows else None,
             # Methods that look back start anew where a load jumps: they would smear it over the steps around.
             fresh=self._fresh or self._loading.jumps(self._clock.time, self._clock.end),
@@ -214,7 +215,9 @@ class Simulation(Bodies):
 
     def _follow(self) -> None:
         """Loads on the surface as it is now; on that at rest where all displacements count as small."""
-        positions = None if self._laws.linear or not self._loading.follows else self._read(self._world.x)
+        positions = None
+        if self._loading.follows and not self._laws.linear:
+            positions = transfer.read(self._world, self._world.x, self._counts.nodes).astype(np.float64)
         transfer.write(self._world, self._world.outside, self._loading.forces(self._share, positions))
 
     # Surroundings and materials
@@ -295,7 +298,6 @@ class Simulation(Bodies):
                 "rotation": transfer.read(w, w.rotation, m),
                 "plastic": transfer.read(w, w.plastic, m),
                 **transfer.read_contacts(w, self._counts.colliders, n),
-                **self._space.state(),
             }
             if self._integrator_remembers:
                 arrays |= {name: transfer.read(w, getattr(w, name), n) for name in PAST}
@@ -320,8 +322,6 @@ class Simulation(Bodies):
         self._clock, self._fresh = clock, bool(header["fresh"])
         self._surroundings.forget()
         self._surround(self.time, self.dt)
-        with self._kernels():
-            self._space.restore(arrays)
         self._stats = self._loaded = None
 
     @property

@@ -4,6 +4,7 @@ import numpy as np
 
 from taichifem.layout import Layout
 from taichifem.linear_algebra.aggregates import Aggregates
+from taichifem.linear_algebra.levels import Levels
 from taichifem.linear_algebra.pattern import BlockPattern
 from taichifem.runtime import PRECISIONS, ti
 from taichifem.world import World
@@ -48,18 +49,12 @@ def _fill_elements(w: ti.template(), indices: _array(), gradients: _array(), vol
 @ti.kernel
 def _fill_pattern(
     w: ti.template(),
-    row_start: _array(),
-    column: _array(),
     pair_start: _array(),
     pair_entry: _array(),
     upper: _array(),
     lower: _array(),
     diagonal: _array(),
 ):
-    for i in range(row_start.shape[0]):
-        w.row_start[i] = row_start[i]
-    for i in range(column.shape[0]):
-        w.column[i] = column[i]
     for i in range(pair_start.shape[0]):
         w.pair_start[i] = pair_start[i]
     for i in range(pair_entry.shape[0]):
@@ -72,13 +67,44 @@ def _fill_pattern(
 
 
 @ti.kernel
-def _fill_aggregates(w: ti.template(), node: _array(), start: _array(), of: _array()):
-    for k in range(node.shape[0]):
-        w.aggregate_node[k] = node[k]
-    for g in range(start.shape[0]):
-        w.aggregate_start[g] = start[g]
-    for i in range(of.shape[0]):
-        w.aggregate[i] = of[i]
+def _fill_levels(
+    w: ti.template(),
+    row_start: _array(),
+    column: _array(),
+    parent: _array(),
+    begin: _array(),
+    end: _array(),
+    first: _array(),
+    pair: _array(),
+    member_start: _array(),
+    member: _array(),
+    own: _array(),
+    operations: _array(),
+):
+    for i in range(row_start.shape[0]):
+        w.row_start[i] = row_start[i]
+    for i in range(column.shape[0]):
+        w.column[i] = column[i]
+    for i in range(parent.shape[0]):
+        w.parent[i] = parent[i]
+    for g in range(begin.shape[0]):
+        w.child_begin[g] = begin[g]
+        w.child_end[g] = end[g]
+    for level in range(first.shape[0]):
+        w.level_first[level] = first[level]
+    for q in range(pair.shape[0]):
+        for a in ti.static(range(4)):
+            w.coarse_pair[q][a] = pair[q, a]
+    for q in range(member_start.shape[0]):
+        w.member_start[q] = member_start[q]
+    for k in range(member.shape[0]):
+        for a in ti.static(range(2)):
+            w.member[k][a] = member[k, a]
+    for g in range(own.shape[0]):
+        w.own_block[g] = own[g]
+    for k in range(operations.shape[0]):
+        for a in ti.static(range(3)):
+            w.operation[k][a] = operations[k, a]
 
 
 @ti.kernel
@@ -194,13 +220,14 @@ def fill(w: World, layout: Layout, pattern: BlockPattern) -> None:
     if w.capacity.springs:
         write(w, w.spring_share, layout.edge_shares)
     p = pattern
-    _fill_pattern(w, p.row_start, p.column, p.pair_start, p.pair_entry, p.upper, p.lower, p.diagonal)
+    _fill_pattern(w, p.pair_start, p.pair_entry, p.upper, p.lower, p.diagonal)
 
 
-def fill_aggregates(w: World, aggregates: Aggregates) -> None:
-    """Which nodes make up each aggregate."""
-    if aggregates.count:
-        _fill_aggregates(w, aggregates.node, aggregates.start, aggregates.of)
+def fill_levels(w: World, levels: Levels, aggregates: Aggregates, operations: np.ndarray) -> None:
+    """The matrices of all levels of the solver, its aggregates, and its operations (k,3)."""
+    a = aggregates
+    of_levels = levels.pair, levels.member_start, levels.member, levels.own
+    _fill_levels(w, levels.row_start, levels.column, a.parent, a.begin, a.end, a.first, *of_levels, operations)
 
 
 def fill_table(w: World, table: np.ndarray, body_start: np.ndarray, body_flies: np.ndarray) -> None:

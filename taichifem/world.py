@@ -18,6 +18,16 @@ CHUNKS = 64
 """Parallel sums add this many contiguous parts, in order: the same result for any number of threads."""
 
 
+MOST_LEVELS = 12
+"""Coarse levels of the solver at most: far more than memory would ever need."""
+
+DENSE = 96
+"""Rows of the last level at most, where it is solved directly."""
+
+MOST_TURNS = 4096
+"""Operations of a solve in one launch at most."""
+
+
 def round_up(count: int, least: int) -> int:
     """The power of two that holds `count`, at least `least`."""
     return max(least, 1 << max(0, int(count) - 1).bit_length())
@@ -38,11 +48,15 @@ class Capacity:
     poses: int = 1
     bodies: int = 1
     aggregates: int = 1
+    coarse_blocks: int = 1
+    coarse_pairs: int = 1
+    members: int = 1
+    operations: int = 1
     dimension: int = 3  # of the elements: 3 for tetrahedra, 2 for triangles in the plane y = 0
     tangents: bool = False  # do elements store their stiffness blocks? Isotropic laws and springs need it
     springs: bool = False  # are there elements made of springs?
 
-    LEAST = (256, 1024, 4096, 2048, 8, 4, 256, 256, 8, 8, 16)
+    LEAST = (256, 1024, 4096, 2048, 8, 4, 256, 256, 8, 8, 32, 1024, 256, 1024, 64)
 
     def rounded(self) -> Capacity:
         """The capacity class: every count rounded up to a power of two."""
@@ -59,6 +73,7 @@ class Counts:
     elements: int = 0
     pairs: int = 0
     bodies: int = 0
+    flying: int = 0  # bodies that no pin holds
     colliders: int = 0
     held: int = 0
     pulled: int = 0
@@ -141,35 +156,44 @@ class World:
 
     def _place_matrix(self) -> None:
         c = self.capacity
-        self.row_start, self.column = self._scalar(c.nodes + 1, ti.i32), self._scalar(c.blocks, ti.i32)
+        # Rows of the nodes, and below them those of the coarse levels (`linear_algebra.levels`).
+        rows, blocks = c.nodes + 2 * c.aggregates, c.blocks + c.coarse_blocks
+        self.row_start, self.column = self._scalar(rows + 1, ti.i32), self._scalar(blocks, ti.i32)
+        self.block = self._matrix(blocks, 3, 3)
         self.pair_start, self.pair_entry = (
             self._scalar(c.pairs + 1, ti.i32),
             self._scalar(self.corner_pairs * c.elements, ti.i32),
         )
         self.upper, self.lower = self._scalar(c.pairs, ti.i32), self._scalar(c.pairs, ti.i32)
         self.diagonal = self._scalar(c.nodes, ti.i32)
-        self.block = self._matrix(c.blocks, 3, 3)
+        self.own = self._matrix(c.nodes, 3, 3)  # diagonal blocks without springs
         self.tangent = self._matrix(self.corner_pairs * c.elements if c.tangents else 1, self.d, self.d)
         self.spring = self._matrix(c.nodes, 3, 3)  # dt^2 times contact and handle stiffness, on the diagonal
         self.spring_load = self._vector(c.nodes, 3)
         self.sprung = self._scalar(c.nodes, ti.i32)  # 1 where a spring acts
         self.inverse = self._matrix(c.nodes, 3, 3)
-        self.residual, self.direction, self.product = (self._vector(c.nodes, 3) for _ in range(3))
-        self.partial = self._vector(CHUNKS, 7, ti.f64)
+        self.direction, self.product = self._vector(c.nodes, 3), self._vector(c.nodes, 3)
+        # Right-hand side, solution and work space of every level; that of the nodes is the residual.
+        self.residual, self.z, self.left = (self._vector(rows, 3) for _ in range(3))
+        self.partial = self._vector(CHUNKS, 3, ti.f64)
         self.scalar = self._scalar(16, ti.f64)
 
     def _place_coarse(self) -> None:
         n, groups = self.capacity.nodes, self.capacity.aggregates
-        self.aggregate, self.aggregate_node = self._scalar(n, ti.i32), self._scalar(n, ti.i32)
-        self.aggregate_start = self._scalar(groups + 1, ti.i32)
-        # Where each aggregate is, how far it has turned since the inverse was made, and its size; nodes' arms then.
-        self.centre, self.turn, self.reach = self._vector(groups, 3), self._vector(groups, 4), self._scalar(groups)
-        self.arm = self._vector(n, 3)
-        self.coarse, self.coarse_inverse = ti.field(ti.f64), ti.field(self.real)
-        for field in (self.coarse, self.coarse_inverse):
-            self._builder.dense(ti.ij, (6 * groups, 6 * groups)).place(field)
-        self.coarse_residual, self.coarse_solution = self._scalar(6 * groups), self._scalar(6 * groups)
-        self.shift, self.spin = self._vector(groups, 3), self._vector(groups, 3)
+        self.parent = self._scalar(n + groups, ti.i32)
+        self.child_begin, self.child_end = self._scalar(groups, ti.i32), self._scalar(groups, ti.i32)
+        self.level_first = self._scalar(MOST_LEVELS + 1, ti.i32)
+        self.centre, self.reach = self._vector(groups, 3), self._scalar(groups)
+        self.coarse_pair = self._vector(self.capacity.coarse_pairs, 4, ti.i32)
+        self.member_start = self._scalar(self.capacity.coarse_pairs + 1, ti.i32)
+        self.member = self._vector(self.capacity.members, 2, ti.i32)
+        # Where each aggregate's own blocks are, and their inverse: four blocks, shift and turn by shift and turn.
+        self.own_block, self.own_inverse = self._scalar(groups, ti.i32), self._matrix(4 * groups, 3, 3)
+        # Inverse of the last level's matrix, and the diagonal that the matrix had.
+        self.last_inverse, self.pivot = self._scalar(DENSE * DENSE, ti.f64), self._scalar(DENSE, ti.f64)
+        # What a solve does, operation by operation: kind, level, number of pieces (`linear_algebra.program`).
+        self.operation = self._vector(self.capacity.operations, 3, ti.i32)
+        self.claimed, self.finished = self._scalar(MOST_TURNS, ti.i32), self._scalar(MOST_TURNS, ti.i32)
 
     def _place_surroundings(self) -> None:
         c = self.capacity

@@ -18,6 +18,7 @@ from taichifem.errors import InputError
 from taichifem.mesh import Mesh
 
 INTEGRATORS = ("backward-euler", "backward-euler-newton", "bdf2", "newmark", "symplectic-euler", "quasi-static")
+SOLVERS = ("multilevel", "block-jacobi")
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -135,6 +136,8 @@ class Scene:
     integrator: "backward-euler" (one linearisation a step), "backward-euler-newton" (to convergence), "bdf2" and
     "newmark" (second order, Newton's method), "symplectic-euler" (explicit), or "quasi-static" (no inertia: balance at
     every step).
+    solver: of the linear systems, conjugate gradients with the preconditioner "multilevel", or "block-jacobi", which
+    suits soft or tiny scenes at best and is there for comparison.
     tolerance: relative residual at which the linear solver stops.  max_iterations: its cap, told when hit.
     newton_tolerance: size of the out-of-balance force, relative to the first, at which Newton's method stops.
     """
@@ -146,6 +149,7 @@ class Scene:
     substeps: int | None = None
     seconds: float = 5.0
     integrator: str = "backward-euler"
+    solver: str = "multilevel"
     tolerance: float = 1e-3
     max_iterations: int = 2000
     newton_tolerance: float = 1e-6
@@ -167,6 +171,7 @@ class Scene:
             check.whole("substeps", self.substeps)
         check.number("seconds", self.seconds, above=0, unit="s")
         check.choice("integrator", self.integrator, INTEGRATORS)
+        check.choice("solver", self.solver, SOLVERS)
         check.number("tolerance", self.tolerance, above=0, below=1)
         check.whole("max_iterations", self.max_iterations)
         check.number("newton_tolerance", self.newton_tolerance, above=0, below=1)

@@ -116,7 +116,7 @@ def solve(step: Step, *, h: float, newton: int, inertia: bool = True) -> StepRep
     newton: most linearisations; 1 is the linearly implicit method.
     """
     w, n = step.w, step.counts.nodes
-    counts = step.counts if inertia else replace(step.counts, bodies=0)
+    counts = step.counts if inertia else replace(step.counts, flying=0)
     weight = float(np.linalg.norm(step.gravity)) * h if inertia else ALWAYS
     noise = float(np.finfo(np.float32 if w.precision == "f32" else np.float64).eps) / h
     report, first = StepReport(balanced=newton == 1), 0.0
@@ -126,7 +126,8 @@ def solve(step: Step, *, h: float, newton: int, inertia: bool = True) -> StepRep
             return pcg.solve(
                 w,
                 counts,
-                step.space,
+                step.program,
+                step.galerkin,
                 tolerance=step.options.tolerance,
                 max_iterations=step.options.max_iterations,
                 noise=noise,

@@ -8,7 +8,7 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from taichifem.laws import Laws
-from taichifem.linear_algebra.coarse import Coarse
+from taichifem.linear_algebra.galerkin import Galerkin
 from taichifem.timing import PhaseTimer
 from taichifem.world import Counts, World
 
@@ -56,7 +56,7 @@ class StepReport:
 class Step:
     """A step of `dt` [s]: the world, where its poses and colliders stand at the end of it, and how to solve.
 
-    gravity: (3,) [m/s^2].  space: the solver's coarse space.
+    gravity: (3,) [m/s^2].  program, galerkin: of the linear solver (`pcg.solve`).
     follow: brings loads that follow the surface up to date, where there are any.
     fresh: there is no past step to go on from.  damped: has some material stiffness damping?
     """
@@ -68,7 +68,8 @@ class Step:
     gravity: np.ndarray
     options: Options
     timer: PhaseTimer
-    space: Coarse
+    program: np.ndarray
+    galerkin: Galerkin | None
     follow: Callable[[], None] | None = None
     fresh: bool = True
     damped: bool = True

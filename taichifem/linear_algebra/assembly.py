@@ -45,6 +45,7 @@ def assemble(w: ti.template(), n_pairs: ti.i32, mass_factor: ti.f64, drag_factor
             for k in ti.static(range(3)):
                 block[k, k] += inertia
             w.block[i] = block
+            w.own[node] = block
         else:
             w.block[i] = block
             w.block[j] = block.transpose()

@@ -42,8 +42,8 @@ def translate(w: ti.template(), n_bodies: ti.i32, drag_factor: ti.f64):
                 inertia += _inertia(w, i, drag_factor)
             c = inertia.inverse() @ total
             for i in range(w.body_start[body], w.body_start[body + 1]):
-                w.dv[i] += ti.cast(c, w.real)
-                w.residual[i] -= ti.cast(_inertia(w, i, drag_factor) @ c, w.real)
+                w.dv[i] = w.dv[i] + ti.cast(c, w.real)
+                w.residual[i] = w.residual[i] - ti.cast(_inertia(w, i, drag_factor) @ c, w.real)
 
 
 @ti.func
@@ -96,4 +96,4 @@ def spin(w: ti.template(), n: ti.i32, n_bodies: ti.i32, drag_factor: ti.f64):
                 curvature += ti.cast(w.direction[i].dot(w.product[i]), ti.f64)
             if curvature > 0:
                 for i in range(w.body_start[body], w.body_start[body + 1]):
-                    w.dv[i] += ti.cast(slope / curvature, w.real) * w.direction[i]
+                    w.dv[i] = w.dv[i] + ti.cast(slope / curvature, w.real) * w.direction[i]

@@ -1,0 +1,122 @@
+"""Runs the operations of a solve (`program`).
+
+On the CPU all threads run the whole program together, in one launch: waking threads for every loop would take longer
+than the loops of small scenes do. An operation is cut into pieces; each thread takes the next one that is left, and
+waits at the end until all are done. A thread that wakes up late, or is sent to sleep by other programs, holds nobody
+up: the others do its pieces. Elsewhere every operation is a launch of its own, with the same code.
+
+(Waiting is done with atomic operations: a plain read might never look at memory again.)
+"""
+
+import numpy as np
+
+from taichifem import runtime
+from taichifem.linear_algebra import multilevel, steps
+from taichifem.linear_algebra import program as p
+from taichifem.linear_algebra.matrix import row
+from taichifem.linear_algebra.steps import Limits
+from taichifem.runtime import ti
+from taichifem.world import DENSE, World
+
+
+@ti.func
+def _perform(w: ti.template(), n: ti.i32, kind: ti.i32, level: ti.i32, c: ti.i32, pieces: ti.i32):
+    """Piece c of an operation, and its share of the sums that some need."""
+    first, items = 0, n
+    if level > 0:
+        first, items = w.level_first[level - 1], w.level_first[level] - w.level_first[level - 1]
+    begin, end = steps.range_of(items, c, pieces)
+    begin, end = first + begin, first + end
+    sums = ti.Vector.zero(ti.f64, 3)
+    if kind == p.ADVANCE:
+        alpha = ti.cast(w.scalar[steps.ALPHA], w.real)
+        for i in range(begin, end):
+            sums += steps.advance(w, i, alpha)
+    elif kind == p.LEAVE:
+        rows, last = begin, end
+        if level > 0:
+            rows, last = n + 2 * begin, n + 2 * end
+        for i in range(rows, last):
+            multilevel.leave(w, i)
+    elif kind == p.RESTRICT:
+        for g in range(begin, end):
+            multilevel.restrict(w, n, level, g)
+    elif kind == p.CORRECT:
+        for item in range(begin, end):
+            multilevel.correct(w, n, level, item)
+    elif kind == p.SMOOTH:
+        for item in range(begin, end):
+            sums[0] += multilevel.smooth(w, n, level, item)
+    elif kind == p.LAST:
+        whole = 6 * (w.level_first[level] - w.level_first[level - 1]) <= DENSE
+        multilevel.solve_last(w, n, level, whole)
+    elif kind == p.PLAIN:
+        for i in range(begin, end):
+            sums[0] += ti.cast(w.residual[i].dot(w.z[i]), ti.f64)
+    elif kind == p.DIRECT:
+        beta = ti.cast(w.scalar[steps.BETA], w.real)
+        for i in range(begin, end):
+            w.direction[i] = w.z[i] + beta * w.direction[i]
+    elif kind == p.PRODUCT:
+        for i in range(begin, end):
+            q = w.free[i] * row(w, w.direction, i)
+            w.product[i] = q
+            sums[0] += ti.cast(w.direction[i].dot(q), ti.f64)
+    w.partial[c] = sums
+
+
+@ti.func
+def _conclude(w: ti.template(), kind: ti.i32, level: ti.i32, pieces: ti.i32, tolerance: ti.f64, most: ti.i32):
+    """What follows from the sums once all pieces of an operation are done."""
+    if kind == p.ADVANCE:
+        steps.after_advance(w, pieces, tolerance, most)
+    elif (kind == p.SMOOTH and level == 0) or kind == p.PLAIN:
+        steps.after_cycle(w, pieces)
+    elif kind == p.PRODUCT:
+        steps.after_product(w, pieces)
+
+
+@ti.kernel
+def _run_together(
+    w: ti.template(), workers: ti.i32, n: ti.i32, operations: ti.i32, rounds: ti.i32, tolerance: ti.f64, most: ti.i32
+):
+    ti.loop_config(serialize=True)
+    for turn in range(operations * rounds):
+        w.claimed[turn] = 0
+        w.finished[turn] = 0
+    ti.loop_config(block_dim=1)
+    for _ in range(workers):
+        for turn in range(operations * rounds):
+            if w.scalar[steps.DONE] == 0:
+                operation = w.operation[turn % operations]
+                kind, level, pieces = operation[0], operation[1], operation[2]
+                c = ti.atomic_add(w.claimed[turn], 1)
+                while c < pieces:
+                    _perform(w, n, kind, level, c, pieces)
+                    if ti.atomic_add(w.finished[turn], 1) == pieces - 1:
+                        _conclude(w, kind, level, pieces, tolerance, most)
+                        ti.atomic_add(w.finished[turn], 1)
+                    c = ti.atomic_add(w.claimed[turn], 1)
+                while ti.atomic_or(w.finished[turn], 0) <= pieces:
+                    pass
+
+
+@ti.kernel
+def _run_one(w: ti.template(), n: ti.i32, kind: ti.i32, level: ti.i32, pieces: ti.i32, tolerance: ti.f64, most: ti.i32):
+    for c in range(pieces):
+        if w.scalar[steps.DONE] == 0:
+            _perform(w, n, kind, level, c, pieces)
+    ti.loop_config(serialize=True)
+    for _ in range(1):
+        if w.scalar[steps.DONE] == 0:
+            _conclude(w, kind, level, pieces, tolerance, most)
+
+
+def run(w: World, n: int, program: np.ndarray, limits: Limits, *, rounds: int) -> None:
+    """Repeat the operations of the program (k,3) until the solve is done, at most `rounds` times."""
+    if runtime.running_arch() == "cpu":
+        _run_together(w, runtime.threads(), n, len(program), rounds, limits.tolerance, limits.most)
+        return
+    for _ in range(rounds):
+        for kind, level, pieces in program.tolist():
+            _run_one(w, n, kind, level, pieces, limits.tolerance, limits.most)

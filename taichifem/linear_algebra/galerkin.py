@@ -1,0 +1,194 @@
+"""The matrices Z^T A Z of the coarse levels, made anew for every solve, one level from that below.
+
+Z are the rigid motions of aggregates (see `multilevel`). Every block is gathered in a fixed order: no atomics.
+"""
+
+from taichifem.linear_algebra.aggregates import Aggregates
+from taichifem.linear_algebra.levels import Levels
+from taichifem.runtime import ti
+from taichifem.world import DENSE, World
+
+
+@ti.func
+def arm(w: ti.template(), n: ti.i32, level: ti.i32, item: ti.i32):
+    """From the centre of its aggregate to a node (level 0) or an aggregate, in units of the reach there."""
+    where = ti.Vector.zero(w.real, 3)
+    g = 0
+    if level == 0:
+        g = w.parent[item]
+        where = w.x[item]
+    else:
+        g = w.parent[n + item]
+        where = w.centre[item]
+    return (where - w.centre[g]) / w.reach[g]
+
+
+@ti.func
+def _place(w: ti.template(), position: ti.template(), of_nodes: ti.template(), g: ti.i32):
+    """Centre and reach (root mean square of the arms) of an aggregate of nodes or aggregates."""
+    begin, end = w.child_begin[g], w.child_end[g]
+    centre, square = ti.Vector.zero(w.real, 3), ti.cast(0.0, w.real)
+    for k in range(begin, end):
+        centre += position[k]
+    centre /= ti.cast(end - begin, w.real)
+    for k in range(begin, end):
+        square += (position[k] - centre).norm_sqr()
+        if ti.static(not of_nodes):
+            square += w.reach[k] ** 2
+    w.centre[g] = centre
+    w.reach[g] = ti.max(ti.sqrt(square / ti.cast(end - begin, w.real)), ti.cast(1e-12, w.real))
+
+
+@ti.func
+def _crossed(M, r):
+    """The matrix whose column b is M (e_b x r): its rows are r x (rows of M)."""
+    return ti.Matrix.rows([r.cross(ti.Vector([M[a, 0], M[a, 1], M[a, 2]])) for a in ti.static(range(3))])
+
+
+@ti.func
+def _store(w: ti.template(), n: ti.i32, q: ti.i32, shift, right, turned, both):
+    """The four blocks of pair q, and those of its mirror image."""
+    g, o, at, mirror = w.coarse_pair[q][0], w.coarse_pair[q][1], w.coarse_pair[q][2], w.coarse_pair[q][3]
+    width = w.row_start[n + 2 * g + 1] - w.row_start[n + 2 * g]
+    w.block[at], w.block[at + 1] = shift, right
+    w.block[at + width], w.block[at + width + 1] = turned, both
+    if g != o:
+        width = w.row_start[n + 2 * o + 1] - w.row_start[n + 2 * o]
+        w.block[mirror], w.block[mirror + 1] = shift.transpose(), turned.transpose()
+        w.block[mirror + width], w.block[mirror + width + 1] = right.transpose(), both.transpose()
+
+
+@ti.kernel
+def _gather_nodes(w: ti.template(), n: ti.i32, aggregates: ti.i32, pairs: ti.i32):
+    """Level 1, from the matrix of the nodes."""
+    for g in range(aggregates):
+        _place(w, w.x, True, g)
+    for q in range(pairs):
+        shift, right = ti.Matrix.zero(w.real, 3, 3), ti.Matrix.zero(w.real, 3, 3)
+        turned, both = ti.Matrix.zero(w.real, 3, 3), ti.Matrix.zero(w.real, 3, 3)
+        for m in range(w.member_start[q], w.member_start[q + 1]):
+            i, k = w.member[m][0], w.member[m][1]
+            j = w.column[k]
+            block = w.block[k] * w.free[i].outer_product(w.free[j])
+            # Columns of the turns: A (e_b x arm); rows in the same way.
+            block_right = _crossed(block, arm(w, n, 0, j))
+            arm_i = arm(w, n, 0, i)
+            shift += block
+            right += block_right
+            turned += _crossed(block.transpose(), arm_i).transpose()
+            both += _crossed(block_right.transpose(), arm_i).transpose()
+        _store(w, n, q, shift, right, turned, both)
+
+
+@ti.kernel
+def _gather_level(w: ti.template(), n: ti.i32, level: ti.i32, first: ti.i32, end: ti.i32, begin: ti.i32, last: ti.i32):
+    """A level from that below: aggregates `first` to `end`, pairs `begin` to `last`."""
+    for g in range(first, end):
+        _place(w, w.centre, False, g)
+    for q in range(begin, last):
+        shift, right = ti.Matrix.zero(w.real, 3, 3), ti.Matrix.zero(w.real, 3, 3)
+        turned, both = ti.Matrix.zero(w.real, 3, 3), ti.Matrix.zero(w.real, 3, 3)
+        for m in range(w.member_start[q], w.member_start[q + 1]):
+            i, k = w.member[m][0], w.member[m][1]
+            j = (w.column[k] - n) // 2
+            width = w.row_start[n + 2 * i + 1] - w.row_start[n + 2 * i]
+            # A turn of the parent shifts a child by its arm, and turns it: less, in units of their reaches.
+            arm_i, share_i = arm(w, n, level - 1, i), w.reach[i] / w.reach[w.parent[n + i]]
+            arm_j, share_j = arm(w, n, level - 1, j), w.reach[j] / w.reach[w.parent[n + j]]
+            block, mixed = w.block[k], w.block[k + width]
+            block_right = _crossed(block, arm_j) + share_j * w.block[k + 1]
+            mixed_right = _crossed(mixed, arm_j) + share_j * w.block[k + width + 1]
+            shift += block
+            right += block_right
+            turned += _crossed(block.transpose(), arm_i).transpose() + share_i * mixed
+            both += _crossed(block_right.transpose(), arm_i).transpose() + share_i * mixed_right
+        _store(w, n, q, shift, right, turned, both)
+
+
+@ti.func
+def _firm(w: ti.template(), M):
+    """M with a diagonal that can be inverted: motions that no node can follow (all pinned, or in a line) have none."""
+    for a in ti.static(range(3)):
+        M[a, a] = ti.max(M[a, a] * (1 + ti.cast(1e-4, w.real)), 1e-30)
+    return M
+
+
+@ti.kernel
+def _invert_own(w: ti.template(), n: ti.i32, aggregates: ti.i32):
+    """The inverse of each aggregate's own matrix [[A, B], [B^T, D]], by Schur's complement of A."""
+    for g in range(aggregates):
+        k = w.own_block[g]
+        width = w.row_start[n + 2 * g + 1] - w.row_start[n + 2 * g]
+        inverse = _firm(w, w.block[k]).inverse()
+        B = w.block[k + 1]
+        half = inverse @ B
+        schur = _firm(w, w.block[k + width + 1]) - B.transpose() @ half
+        rest = schur.inverse()
+        across = half @ rest
+        w.own_inverse[4 * g] = inverse + across @ half.transpose()
+        w.own_inverse[4 * g + 1] = -across
+        w.own_inverse[4 * g + 2] = -across.transpose()
+        w.own_inverse[4 * g + 3] = rest
+
+
+@ti.kernel
+def _invert_last(w: ti.template(), n: ti.i32, first: ti.i32, end: ti.i32):
+    """Invert the whole matrix of the last level, by Gauss and Jordan, in its place.
+
+    A motion without stiffness but for round-off is left out.
+    """
+    ti.loop_config(serialize=True)
+    for _ in range(1):
+        size = 6 * (end - first)
+        for k in range(size * size):
+            w.last_inverse[k] = 0.0
+        for row in range(2 * (end - first)):
+            for k in range(w.row_start[n + 2 * first + row], w.row_start[n + 2 * first + row + 1]):
+                column = w.column[k] - n - 2 * first
+                for a in ti.static(range(3)):
+                    for b in ti.static(range(3)):
+                        w.last_inverse[(3 * row + a) * size + 3 * column + b] = ti.cast(w.block[k][a, b], ti.f64)
+        for k in range(size):
+            w.pivot[k] = w.last_inverse[k * size + k]
+        for k in range(size):
+            pivot = w.last_inverse[k * size + k]
+            if pivot > ti.cast(ti.static({"f32": 1e-5, "f64": 1e-11}[w.precision]), ti.f64) * w.pivot[k]:
+                w.last_inverse[k * size + k] = 1.0
+                for j in range(size):
+                    w.last_inverse[k * size + j] /= pivot
+                for i in range(size):
+                    if i != k:
+                        factor = w.last_inverse[i * size + k]
+                        w.last_inverse[i * size + k] = 0.0
+                        for j in range(size):
+                            w.last_inverse[i * size + j] -= factor * w.last_inverse[k * size + j]
+            else:
+                w.pivot[k] = -1.0
+        for k in range(size):
+            if w.pivot[k] < 0:
+                for j in range(size):
+                    w.last_inverse[k * size + j] = 0.0
+                    w.last_inverse[j * size + k] = 0.0
+
+
+class Galerkin:
+    """Makes the coarse matrices of a world."""
+
+    def __init__(self, aggregates: Aggregates, levels: Levels) -> None:
+        self._n, self._count = len(aggregates.order), aggregates.count
+        self._first, self._pair = aggregates.first.tolist(), levels.first_pair.tolist()
+
+    @property
+    def solves_last(self) -> bool:
+        """Is the last level small enough to be inverted whole?"""
+        return 6 * (self._first[-1] - self._first[-2]) <= DENSE
+
+    def renew(self, w: World) -> None:
+        """All coarse matrices and inverses, from `w.block` of the nodes at `w.x`."""
+        n, first, pair = self._n, self._first, self._pair
+        _gather_nodes(w, n, first[1], pair[1])
+        for level in range(2, len(first)):
+            _gather_level(w, n, level, first[level - 1], first[level], pair[level - 1], pair[level])
+        _invert_own(w, n, self._count)
+        if self.solves_last:
+            _invert_last(w, n, first[-2], first[-1])
