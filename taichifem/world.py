@@ -24,6 +24,9 @@ MOST_LEVELS = 12
 DENSE = 96
 """Rows of the last level at most, where it is solved directly."""
 
+SIDES = 8
+"""Shares of an operation that threads begin with: one for each, up to this many."""
+
 MOST_TURNS = 4096
 """Operations of a solve in one launch at most."""
 
@@ -193,7 +196,8 @@ class World:
         self.last_inverse, self.pivot = self._scalar(DENSE * DENSE, ti.f64), self._scalar(DENSE, ti.f64)
         # What a solve does, operation by operation: kind, level, number of pieces (`linear_algebra.program`).
         self.operation = self._vector(self.capacity.operations, 3, ti.i32)
-        self.claimed, self.finished = self._scalar(MOST_TURNS, ti.i32), self._scalar(MOST_TURNS, ti.i32)
+        self.claimed, self.finished = ti.field(ti.i32), self._scalar(MOST_TURNS, ti.i32)
+        self._builder.dense(ti.ij, (MOST_TURNS, SIDES)).place(self.claimed)
 
     def _place_surroundings(self) -> None:
         c = self.capacity

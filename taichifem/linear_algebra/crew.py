@@ -1,8 +1,8 @@
 """Runs the operations of a solve (`program`).
 
 On the CPU all threads run the whole program together, in one launch: waking threads for every loop would take longer
-than the loops of small scenes do. An operation is cut into pieces; each thread takes the next one that is left, and
-waits at the end until all are done. A thread that wakes up late, or is sent to sleep by other programs, holds nobody
+than the loops of small scenes do. An operation is cut into pieces; each thread takes the next one of its own share that is left, so
+that its caches know it, then those of the others, and waits at the end until all are done. A thread that wakes up late, or is sent to sleep by other programs, holds nobody
 up: the others do its pieces. Elsewhere every operation is a launch of its own, with the same code.
 
 (Waiting is done with atomic operations: a plain read might never look at memory again.)
@@ -16,7 +16,7 @@ from taichifem.linear_algebra import program as p
 from taichifem.linear_algebra.matrix import row
 from taichifem.linear_algebra.steps import Limits
 from taichifem.runtime import ti
-from taichifem.world import DENSE, World
+from taichifem.world import DENSE, SIDES, World
 
 
 @ti.func
@@ -82,21 +82,26 @@ def _run_together(
 ):
     ti.loop_config(serialize=True)
     for turn in range(operations * rounds):
-        w.claimed[turn] = 0
+        for side in ti.static(range(SIDES)):
+            w.claimed[turn, side] = 0
         w.finished[turn] = 0
     ti.loop_config(block_dim=1)
-    for _ in range(workers):
+    for me in range(workers):
+        sides = ti.min(workers, SIDES)
         for turn in range(operations * rounds):
             if w.scalar[steps.DONE] == 0:
                 operation = w.operation[turn % operations]
                 kind, level, pieces = operation[0], operation[1], operation[2]
-                c = ti.atomic_add(w.claimed[turn], 1)
-                while c < pieces:
-                    _perform(w, n, kind, level, c, pieces)
-                    if ti.atomic_add(w.finished[turn], 1) == pieces - 1:
-                        _conclude(w, kind, level, pieces, tolerance, most)
-                        ti.atomic_add(w.finished[turn], 1)
-                    c = ti.atomic_add(w.claimed[turn], 1)
+                for k in range(sides):
+                    side = (me + k) % sides
+                    first, last = steps.range_of(pieces, side, sides)
+                    c = first + ti.atomic_add(w.claimed[turn, side], 1)
+                    while c < last:
+                        _perform(w, n, kind, level, c, pieces)
+                        if ti.atomic_add(w.finished[turn], 1) == pieces - 1:
+                            _conclude(w, kind, level, pieces, tolerance, most)
+                            ti.atomic_add(w.finished[turn], 1)
+                        c = first + ti.atomic_add(w.claimed[turn, side], 1)
                 while ti.atomic_or(w.finished[turn], 0) <= pieces:
                     pass
 
