@@ -42,19 +42,20 @@ class Bodies:
         self._loading = Loading(self._layout)
         self._levels: Levels = stack_levels(self._pattern, self._layout.aggregates)
         self._galerkin = Galerkin(self._layout.aggregates, self._levels) if scene.solver == "multilevel" else None
-        self._program = write_program(len(self._layout.rest), self._layout.aggregates, solver=scene.solver)
+        self._program = write_program(self._pattern, self._layout.aggregates, solver=scene.solver)
         self._generation = runtime.generation
         self._world: World = acquire(self._capacity(), precision, self)
         self._counts = Counts(
             nodes=len(self._layout.rest),
             elements=len(self._layout.cells),
             pairs=self._pattern.n_pairs,
+            pieces=self._pattern.pieces,
             bodies=len(scene.bodies),
             colliders=len(scene.colliders),
         )
         with self._kernels():
             transfer.fill(self._world, self._layout, self._pattern)
-            transfer.fill_levels(self._world, self._levels, self._layout.aggregates, self._program)
+            transfer.fill_levels(self._world, self._pattern, self._levels, self._layout.aggregates, self._program)
         self._surroundings = Surroundings(scene, self._layout, self._world, self._counts)
         self._gravity = np.asarray(scene.gravity, dtype=float)
 
@@ -259,11 +260,13 @@ class Bodies:
             assembly.assemble(self._world, self._counts.pairs, 0.0, 0.0)
             blocks = transfer.read(self._world, self._world.block, pattern.n_blocks).astype(np.float64)
         n, order = 3 * self._counts.nodes, self._layout.node_order
-        row = np.repeat(order, np.diff(pattern.row_start))
-        by_row = np.lexsort((order[pattern.column], row))
+        row, off = order[pattern.row], np.flatnonzero(pattern.lower != pattern.upper)
+        column, block = order[pattern.column[pattern.upper]], blocks[pattern.upper]
+        row, column = np.r_[row, column[off]], np.r_[column, row[off]]
+        block = np.concatenate([block, block[off].transpose(0, 2, 1)])
+        by_row = np.lexsort((column, row))
         start = np.r_[0, np.cumsum(np.bincount(row))]
-        matrix = scipy.sparse.bsr_matrix((blocks[by_row], order[pattern.column][by_row], start), shape=(n, n))
-        return matrix.tocsr()
+        return scipy.sparse.bsr_matrix((block[by_row], column[by_row], start), shape=(n, n)).tocsr()
 
     def _measure(self) -> None:
         with self._kernels():

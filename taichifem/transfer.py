@@ -71,6 +71,7 @@ def _fill_levels(
     w: ti.template(),
     row_start: _array(),
     column: _array(),
+    near: _array(),
     parent: _array(),
     begin: _array(),
     end: _array(),
@@ -83,6 +84,8 @@ def _fill_levels(
 ):
     for i in range(row_start.shape[0]):
         w.row_start[i] = row_start[i]
+        if i + 1 < row_start.shape[0]:
+            w.near[i] = near[i] if i < near.shape[0] else row_start[i + 1]
     for i in range(column.shape[0]):
         w.column[i] = column[i]
     for i in range(parent.shape[0]):
@@ -223,11 +226,15 @@ def fill(w: World, layout: Layout, pattern: BlockPattern) -> None:
     _fill_pattern(w, p.pair_start, p.pair_entry, p.upper, p.lower, p.diagonal)
 
 
-def fill_levels(w: World, levels: Levels, aggregates: Aggregates, operations: np.ndarray) -> None:
+def fill_levels(
+    w: World, pattern: BlockPattern, levels: Levels, aggregates: Aggregates, operations: np.ndarray
+) -> None:
     """The matrices of all levels of the solver, its aggregates, and its operations (k,3)."""
     a = aggregates
     of_levels = levels.pair, levels.member_start, levels.member, levels.own
-    _fill_levels(w, levels.row_start, levels.column, a.parent, a.begin, a.end, a.first, *of_levels, operations)
+    _fill_levels(
+        w, levels.row_start, levels.column, pattern.near, a.parent, a.begin, a.end, a.first, *of_levels, operations
+    )
 
 
 def fill_table(w: World, table: np.ndarray, body_start: np.ndarray, body_flies: np.ndarray) -> None:

@@ -12,11 +12,8 @@ import weakref
 from dataclasses import astuple, dataclass
 
 from taichifem import runtime
+from taichifem.linear_algebra.pattern import PIECES
 from taichifem.runtime import ti
-
-CHUNKS = 64
-"""Parallel sums add this many contiguous parts, in order: the same result for any number of threads."""
-
 
 MOST_LEVELS = 12
 """Coarse levels of the solver at most: far more than memory would ever need."""
@@ -75,6 +72,7 @@ class Counts:
     nodes: int = 0
     elements: int = 0
     pairs: int = 0
+    pieces: int = 0  # that work on nodes is cut into
     bodies: int = 0
     flying: int = 0  # bodies that no pin holds
     colliders: int = 0
@@ -162,6 +160,7 @@ class World:
         # Rows of the nodes, and below them those of the coarse levels (`linear_algebra.levels`).
         rows, blocks = c.nodes + 2 * c.aggregates, c.blocks + c.coarse_blocks
         self.row_start, self.column = self._scalar(rows + 1, ti.i32), self._scalar(blocks, ti.i32)
+        self.near = self._scalar(rows, ti.i32)  # where in a row the blocks begin that stand for their mirror images
         self.block = self._matrix(blocks, 3, 3)
         self.pair_start, self.pair_entry = (
             self._scalar(c.pairs + 1, ti.i32),
@@ -178,7 +177,7 @@ class World:
         self.direction, self.product = self._vector(c.nodes, 3), self._vector(c.nodes, 3)
         # Right-hand side, solution and work space of every level; that of the nodes is the residual.
         self.residual, self.z, self.left = (self._vector(rows, 3) for _ in range(3))
-        self.partial = self._vector(CHUNKS, 3, ti.f64)
+        self.partial = self._vector(PIECES, 3, ti.f64)
         self.scalar = self._scalar(16, ti.f64)
 
     def _place_coarse(self) -> None:

@@ -48,4 +48,5 @@ def assemble(w: ti.template(), n_pairs: ti.i32, mass_factor: ti.f64, drag_factor
             w.own[node] = block
         else:
             w.block[i] = block
-            w.block[j] = block.transpose()
+            if j >= 0:
+                w.block[j] = block.transpose()

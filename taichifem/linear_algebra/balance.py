@@ -7,7 +7,7 @@ forces of a stiff body would spin it up. So the spin that balances the torque is
 along it takes one product with the matrix.
 """
 
-from taichifem.linear_algebra import matrix
+from taichifem.linear_algebra import matrix, steps
 from taichifem.runtime import ti
 
 HELD, TURNS, LINEAR = 0, 1, 2
@@ -78,7 +78,7 @@ def _spin_direction(w: ti.template(), body: ti.i32, drag_factor):
 
 
 @ti.kernel
-def spin(w: ti.template(), n: ti.i32, n_bodies: ti.i32, drag_factor: ti.f64):
+def spin(w: ti.template(), n: ti.i32, pieces: ti.i32, n_bodies: ti.i32, drag_factor: ti.f64):
     """After `translate`: turn every body that flies as far as makes its residual smallest; spends the residual."""
     for body in range(n_bodies):
         if w.body_flies[body] != HELD:
@@ -86,8 +86,10 @@ def spin(w: ti.template(), n: ti.i32, n_bodies: ti.i32, drag_factor: ti.f64):
         else:
             for i in range(w.body_start[body], w.body_start[body + 1]):
                 w.direction[i] = ti.Vector.zero(w.real, 3)
-    for i in range(n):
-        w.product[i] = matrix.row(w, w.direction, i)
+    ti.loop_config(block_dim=1)
+    for c in range(pieces):
+        begin, end = steps.range_of(n, c, pieces)
+        matrix.multiply(w, w.direction, w.product, begin, end)
     for body in range(n_bodies):
         if w.body_flies[body] > 0:
             slope, curvature = ti.cast(0.0, ti.f64), ti.cast(0.0, ti.f64)

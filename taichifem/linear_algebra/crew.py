@@ -1,9 +1,10 @@
 """Runs the operations of a solve (`program`).
 
 On the CPU all threads run the whole program together, in one launch: waking threads for every loop would take longer
-than the loops of small scenes do. An operation is cut into pieces; each thread takes the next one of its own share that is left, so
-that its caches know it, then those of the others, and waits at the end until all are done. A thread that wakes up late, or is sent to sleep by other programs, holds nobody
-up: the others do its pieces. Elsewhere every operation is a launch of its own, with the same code.
+than the loops of small scenes do. An operation is cut into pieces; each thread takes the next one of its own share
+that is left, which its caches know, then those of the others, and waits at the end until all are done. A thread that
+wakes up late, or is sent to sleep by other programs, holds nobody up: the others do its pieces. Elsewhere every
+operation is a launch of its own, with the same code.
 
 (Waiting is done with atomic operations: a plain read might never look at memory again.)
 """
@@ -13,7 +14,7 @@ import numpy as np
 from taichifem import runtime
 from taichifem.linear_algebra import multilevel, steps
 from taichifem.linear_algebra import program as p
-from taichifem.linear_algebra.matrix import row
+from taichifem.linear_algebra.matrix import multiply
 from taichifem.linear_algebra.steps import Limits
 from taichifem.runtime import ti
 from taichifem.world import DENSE, SIDES, World
@@ -36,8 +37,9 @@ def _perform(w: ti.template(), n: ti.i32, kind: ti.i32, level: ti.i32, c: ti.i32
         rows, last = begin, end
         if level > 0:
             rows, last = n + 2 * begin, n + 2 * end
+        multiply(w, w.z, w.left, rows, last)
         for i in range(rows, last):
-            multilevel.leave(w, i)
+            w.left[i] = w.residual[i] - w.left[i]
     elif kind == p.RESTRICT:
         for g in range(begin, end):
             multilevel.restrict(w, n, level, g)
@@ -58,8 +60,9 @@ def _perform(w: ti.template(), n: ti.i32, kind: ti.i32, level: ti.i32, c: ti.i32
         for i in range(begin, end):
             w.direction[i] = w.z[i] + beta * w.direction[i]
     elif kind == p.PRODUCT:
+        multiply(w, w.direction, w.product, begin, end)
         for i in range(begin, end):
-            q = w.free[i] * row(w, w.direction, i)
+            q = w.free[i] * w.product[i]
             w.product[i] = q
             sums[0] += ti.cast(w.direction[i].dot(q), ti.f64)
     w.partial[c] = sums

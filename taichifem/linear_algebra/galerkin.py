@@ -47,8 +47,16 @@ def _crossed(M, r):
 
 @ti.func
 def _store(w: ti.template(), n: ti.i32, q: ti.i32, shift, right, turned, both):
-    """The four blocks of pair q, and those of its mirror image."""
+    """The four blocks of pair q, and those of its mirror image.
+
+    Of an aggregate with itself, one half has been gathered: the other is its mirror image.
+    """
     g, o, at, mirror = w.coarse_pair[q][0], w.coarse_pair[q][1], w.coarse_pair[q][2], w.coarse_pair[q][3]
+    if g == o:
+        shift += shift.transpose()
+        both += both.transpose()
+        right += turned.transpose()
+        turned = right.transpose()
     width = w.row_start[n + 2 * g + 1] - w.row_start[n + 2 * g]
     w.block[at], w.block[at + 1] = shift, right
     w.block[at + width], w.block[at + width + 1] = turned, both
@@ -69,7 +77,8 @@ def _gather_nodes(w: ti.template(), n: ti.i32, aggregates: ti.i32, pairs: ti.i32
         for m in range(w.member_start[q], w.member_start[q + 1]):
             i, k = w.member[m][0], w.member[m][1]
             j = w.column[k]
-            block = w.block[k] * w.free[i].outer_product(w.free[j])
+            # Of the diagonal, a half: see `_store`.
+            block = w.block[k] * w.free[i].outer_product(w.free[j]) * (0.5 if i == j else 1.0)
             # Columns of the turns: A (e_b x arm); rows in the same way.
             block_right = _crossed(block, arm(w, n, 0, j))
             arm_i = arm(w, n, 0, i)
@@ -95,9 +104,10 @@ def _gather_level(w: ti.template(), n: ti.i32, level: ti.i32, first: ti.i32, end
             # A turn of the parent shifts a child by its arm, and turns it: less, in units of their reaches.
             arm_i, share_i = arm(w, n, level - 1, i), w.reach[i] / w.reach[w.parent[n + i]]
             arm_j, share_j = arm(w, n, level - 1, j), w.reach[j] / w.reach[w.parent[n + j]]
-            block, mixed = w.block[k], w.block[k + width]
-            block_right = _crossed(block, arm_j) + share_j * w.block[k + 1]
-            mixed_right = _crossed(mixed, arm_j) + share_j * w.block[k + width + 1]
+            part = 0.5 if i == j else 1.0
+            block, mixed = part * w.block[k], part * w.block[k + width]
+            block_right = _crossed(block, arm_j) + part * share_j * w.block[k + 1]
+            mixed_right = _crossed(mixed, arm_j) + part * share_j * w.block[k + width + 1]
             shift += block
             right += block_right
             turned += _crossed(block.transpose(), arm_i).transpose() + share_i * mixed

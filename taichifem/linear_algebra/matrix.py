@@ -4,9 +4,16 @@ from taichifem.runtime import ti
 
 
 @ti.func
-def row(w: ti.template(), source: ti.template(), i: ti.i32):
-    """Row i of the matrix times the field `source`."""
-    total = ti.Vector.zero(w.real, 3)
-    for k in range(w.row_start[i], w.row_start[i + 1]):
-        total += w.block[k] @ source[w.column[k]]
-    return total
+def multiply(w: ti.template(), source: ti.template(), target: ti.template(), begin: ti.i32, end: ti.i32):
+    """The rows `begin` to `end` of A times `source`, to `target`; rows of nodes must be a piece of `BlockPattern`."""
+    for i in range(begin, end):
+        target[i] = ti.Vector.zero(w.real, 3)
+    for i in range(begin, end):
+        own, total = source[i], ti.Vector.zero(w.real, 3)
+        for k in range(w.row_start[i], w.near[i]):
+            total += w.block[k] @ source[w.column[k]]
+        for k in range(w.near[i], w.row_start[i + 1]):
+            j, block = w.column[k], w.block[k]
+            total += block @ source[j]
+            target[j] = target[j] + block.transpose() @ own
+        target[i] = target[i] + total

@@ -8,7 +8,6 @@ Unknowns of an aggregate are the shift of its centre, and its turn times its `re
 Each function does one operation for one row, node or aggregate; `program` tells in which order they come.
 """
 
-from taichifem.linear_algebra import matrix
 from taichifem.linear_algebra.galerkin import arm
 from taichifem.runtime import ti
 
@@ -28,14 +27,8 @@ def _own(w: ti.template(), g: ti.i32, shift, turn):
 
 
 @ti.func
-def leave(w: ti.template(), row: ti.i32):
-    """What the solution so far leaves of the right-hand side: r - A z."""
-    w.left[row] = w.residual[row] - matrix.row(w, w.z, row)
-
-
-@ti.func
 def restrict(w: ti.template(), n: ti.i32, level: ti.i32, g: ti.i32):
-    """Right-hand side Z^T (r - A z) for aggregate g of `level`, and its first smoothing."""
+    """Right-hand side Z^T (r - A z) for aggregate g of `level`, from `w.left`; and its first smoothing."""
     shift, turn = ti.Vector.zero(w.real, 3), ti.Vector.zero(w.real, 3)
     for item in range(w.child_begin[g], w.child_end[g]):
         left, spin = ti.Vector.zero(w.real, 3), ti.Vector.zero(w.real, 3)
@@ -67,7 +60,7 @@ def correct(w: ti.template(), n: ti.i32, level: ti.i32, item: ti.i32):
 
 @ti.func
 def smooth(w: ti.template(), n: ti.i32, level: ti.i32, item: ti.i32):
-    """After `leave`: smooth z of a node (level 0) or an aggregate; a node's r . z, 0 for an aggregate."""
+    """Smooth z of a node (level 0) or an aggregate, from `w.left`. Gives a node's r . z, 0 for an aggregate."""
     product = ti.cast(0.0, ti.f64)
     if level == 0:
         z = w.z[item] + ti.cast(WEIGHT, w.real) * (w.inverse[item] @ w.left[item])

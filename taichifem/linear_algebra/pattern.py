@@ -6,29 +6,54 @@ from dataclasses import dataclass
 
 import numpy as np
 
+PIECES = 32
+"""Pieces that work on nodes or rows is cut into, at most."""
+
+NODES = 256
+"""Nodes of a piece, about, as long as there are few: smaller ones would store more blocks twice."""
+
+
+def pieces_of(items: int, size: int) -> int:
+    """Into how many pieces of about `size`, and at least two of them, so many items are cut for the threads."""
+    return min(PIECES, max(1, min(2, items // 64), items // size))
+
+
+def piece_starts(items: int, pieces: int) -> np.ndarray:
+    """Where the pieces begin, and the last one ends (pieces+1,): as even as can be, the first ones larger."""
+    return np.r_[0, np.cumsum(items // pieces + (np.arange(pieces) < items % pieces))]
+
 
 @dataclass(frozen=True)
 class BlockPattern:
-    """Symmetric block matrix of n nodes, rows compressed, columns increasing.
+    """Symmetric block matrix of n nodes, whose rows are cut into pieces that threads work on at the same time.
 
-    row_start (n+1,), column (blocks,): the whole matrix by rows.
+    Within a piece only the blocks on and above the diagonal are stored, which spares nearly half of the memory that a
+    product has to read; blocks between two pieces are stored in both rows, so that no piece adds to another's rows.
+
+    row_start (n+1,), column (blocks,): the blocks by rows.  near (n,): where in each row those begin whose mirror image
+        is not stored; before them come the others, the one on the diagonal among them.
     pair_start (pairs+1,), pair_entry: the elements that add to each pair i <= j, as
         element * 16 + a * 4 + b with local nodes a (row i) and b (column j). Gathering them in this order
         makes sums repeat bit for bit.
-    upper, lower (pairs,): where block (i, j) and block (j, i) stand; equal on the diagonal.
+    row, upper, lower (pairs,): i of each pair, and where block (i, j) and block (j, i) stand; equal on the diagonal,
+        and -1 where (j, i) is not stored.
     diagonal (n,): where block (i, i) stands.
     incident_start (n+1,), incident: the element corners at each node, as element * 4 + a.
+    pieces: how many.
     """
 
     row_start: np.ndarray
     column: np.ndarray
+    near: np.ndarray
     pair_start: np.ndarray
     pair_entry: np.ndarray
+    row: np.ndarray
     upper: np.ndarray
     lower: np.ndarray
     diagonal: np.ndarray
     incident_start: np.ndarray
     incident: np.ndarray
+    pieces: int
 
     @property
     def n_nodes(self) -> int:
@@ -64,26 +89,35 @@ def block_pattern(cells: np.ndarray, n_nodes: int) -> BlockPattern:
     first = np.flatnonzero(np.r_[True, key[1:] != key[:-1]])
     i, j = np.divmod(key[first], n_nodes)
 
+    pieces = pieces_of(n_nodes, NODES)
+    piece = np.repeat(np.arange(pieces), np.diff(piece_starts(n_nodes, pieces)))
+    diagonal = i == j
+    near = ~diagonal & (piece[i] == piece[j])
+    far = ~diagonal & ~near
     pairs = np.arange(len(i))
-    off = i != j
-    row, column, pair = np.r_[i, j[off]], np.r_[j, i[off]], np.r_[pairs, pairs[off] + len(pairs)]
-    by_row = np.lexsort((column, row))
-    place = np.empty(2 * len(pairs), dtype=np.int64)
+    row, column, pair = np.r_[i, j[far]], np.r_[j, i[far]], np.r_[pairs, pairs[far] + len(pairs)]
+    later = np.r_[near, near[far]]
+    by_row = np.lexsort((column, later, row))
+    place = np.full(2 * len(pairs), -1, dtype=np.int64)
     place[pair[by_row]] = np.arange(len(by_row))
     upper = place[: len(pairs)]
-    lower = np.where(off, place[len(pairs) :], upper)
+    lower = np.where(diagonal, upper, place[len(pairs) :])
+    row_start = _starts(row[by_row], n_nodes)
 
     corner = cells.ravel()
     by_node = np.argsort(corner, kind="stable")
     narrow = np.int32
     return BlockPattern(
-        row_start=_starts(row[by_row], n_nodes),
+        row_start=row_start,
         column=column[by_row].astype(narrow),
+        near=(row_start[1:] - np.bincount(i[near], minlength=n_nodes)).astype(narrow),
         pair_start=np.r_[first, len(key)].astype(narrow),
         pair_entry=entry.astype(narrow),
+        row=i.astype(narrow),
         upper=upper.astype(narrow),
         lower=lower.astype(narrow),
-        diagonal=upper[~off].astype(narrow),
+        diagonal=upper[diagonal].astype(narrow),
         incident_start=_starts(corner[by_node], n_nodes),
         incident=(by_node // corners * 4 + by_node % corners).astype(narrow),
+        pieces=pieces,
     )

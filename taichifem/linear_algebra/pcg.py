@@ -18,7 +18,6 @@ import numpy as np
 from taichifem.errors import Diverged
 from taichifem.linear_algebra import balance, crew, steps
 from taichifem.linear_algebra.galerkin import Galerkin
-from taichifem.linear_algebra.program import pieces_of
 from taichifem.linear_algebra.steps import COUNT, DONE, INDEFINITE, NOISE, RESIDUAL, SIZE, Limits
 from taichifem.world import MOST_TURNS, Counts, World
 
@@ -63,7 +62,7 @@ def solve(
     Raises Diverged where the residual is not finite.
     """
     n, flying = counts.nodes, counts.bodies if counts.flying else 0
-    steps.begin(w, n, pieces_of(n), noise, weight)
+    steps.begin(w, n, counts.pieces, noise, weight)
     if flying:
         balance.translate(w, flying, drag_factor)
     if galerkin is not None:
@@ -76,7 +75,7 @@ def solve(
             break
     if flying:
         balance.translate(w, flying, drag_factor)
-        balance.spin(w, n, flying, drag_factor)
+        balance.spin(w, n, counts.pieces, flying, drag_factor)
     residual = float(state[RESIDUAL])
     if not math.isfinite(residual):
         raise Diverged("the solver met a number that is not finite: take smaller time steps, or start more gently")

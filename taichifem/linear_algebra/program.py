@@ -8,23 +8,19 @@ from __future__ import annotations
 import numpy as np
 
 from taichifem.linear_algebra.aggregates import Aggregates
-from taichifem.world import CHUNKS, DENSE
+from taichifem.linear_algebra.pattern import BlockPattern, pieces_of
+from taichifem.world import DENSE
 
 ADVANCE, LEAVE, RESTRICT, CORRECT, SMOOTH, LAST, PLAIN, DIRECT, PRODUCT = range(9)
 """Kinds of operations; see `steps` and `multilevel`."""
 
-NODES = 64
-"""Nodes that make a piece of work worth sharing out."""
+ROWS, PARENTS = 16, 8
+"""Aggregates that make a piece of work worth sharing out: their rows, or the gathering from those below."""
 
 
-def pieces_of(items: int, size: int = NODES) -> int:
-    """Into how many pieces of about `size` so many items are cut."""
-    return min(CHUNKS, max(1, items // size))
-
-
-def write_program(n: int, aggregates: Aggregates, *, solver: str) -> np.ndarray:
-    """The operations (k,3) of a round for n nodes: kind, level, pieces.  solver: "multilevel" or "block-jacobi"."""
-    fine = pieces_of(n)
+def write_program(pattern: BlockPattern, aggregates: Aggregates, *, solver: str) -> np.ndarray:
+    """The operations (k,3) of a round: kind, level, pieces.  solver: "multilevel" or "block-jacobi"."""
+    n, fine = pattern.n_nodes, pattern.pieces
     counts = [n, *np.diff(aggregates.first).tolist()]
     last = aggregates.levels
     whole = 6 * counts[last] <= DENSE
@@ -35,8 +31,8 @@ def write_program(n: int, aggregates: Aggregates, *, solver: str) -> np.ndarray:
             return [(LAST, last, 1)]
         # Twice, where what is above is not solved exactly: one visit leaves too much of long waves.
         visits = 1 if level == 0 or (level + 1 == last and whole) else 2
-        items = fine if level == 0 else pieces_of(counts[level], NODES // 8)
-        leave, up = (LEAVE, level, items), pieces_of(counts[level + 1], NODES // 16)
+        items = fine if level == 0 else pieces_of(counts[level], ROWS)
+        leave, up = (LEAVE, level, items), pieces_of(counts[level + 1], PARENTS)
         listing = []
         for _ in range(visits):
             listing += [leave, (RESTRICT, level + 1, up), *visit(level + 1), (CORRECT, level, items)]

@@ -72,14 +72,16 @@ def begin(w: ti.template(), n: ti.i32, pieces: ti.i32, noise: ti.f64, weight: ti
             d = w.own[i] + w.spring[i]
             w.block[w.diagonal[i]] = d
             w.inverse[i] = _inverse_diagonal(w, i, d)
-            w.residual[i] = w.free[i] * (w.load[i] + w.spring_load[i] - matrix.row(w, w.dv, i))
             w.direction[i] = ti.Vector.zero(w.real, 3)
-            w.product[i] = ti.Vector.zero(w.real, 3)
             stiff = (d.trace() - 3 * w.mass[i]) * w.free[i].sum() / 9
             floor = ti.cast(noise, ti.f64) * ti.cast(stiff * w.x[i].norm(), ti.f64)
             sums[0] += _impulse(w, i) * (1 - w.sprung[i])
             sums[1] += floor**2
             sums[2] += ti.cast(w.mass[i] * w.mass[i] * w.free[i].sum() / 3, ti.f64)
+        matrix.multiply(w, w.dv, w.product, first, last)
+        for i in range(first, last):
+            w.residual[i] = w.free[i] * (w.load[i] + w.spring_load[i] - w.product[i])
+            w.product[i] = ti.Vector.zero(w.real, 3)
         w.partial[c] = sums
     ti.loop_config(serialize=True)
     for _ in range(1):

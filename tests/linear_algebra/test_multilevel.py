@@ -1,0 +1,134 @@
+"""The levels of the solver: few iterations whatever the stiffness, and the same answers."""
+
+import numpy as np
+import pytest
+import scipy.sparse.linalg
+
+import taichifem as tf
+from taichifem import transfer
+from taichifem.linear_algebra import crew
+
+SIZE, CELLS = (1.0, 0.25, 0.25), (20, 5, 5)
+HELD = tf.BoxRegion(lower=(-1, -1, -1), upper=(1e-6, 1, 1))
+
+
+def bar(youngs=1e6, poisson=0.4, pins=(HELD,), **body):
+    mesh = tf.TetMesh.bar(size=SIZE, cells=CELLS)
+    return tf.Body(mesh=mesh, material=tf.Material(youngs=youngs, poisson=poisson), pins=pins, **body)
+
+
+@pytest.mark.parametrize("youngs", [1e5, 1e6, 1e7, 1e9])
+def test_iterations_hardly_grow_with_stiffness(youngs):
+    """Block Jacobi takes about 50, 110, 120 and 130 here."""
+    simulation = tf.Simulation(tf.Scene(bodies=[bar(youngs)]))
+    simulation.advance(seconds=0.1)
+    assert simulation.report.converged
+    assert simulation.report.iterations <= 25
+
+
+def test_nearly_incompressible_bodies_converge():
+    simulation = tf.Simulation(tf.Scene(bodies=[bar(1e6, poisson=0.49)]))
+    simulation.advance(seconds=0.1)
+    assert simulation.report.converged
+    assert simulation.report.iterations <= 45
+
+
+def test_the_solution_is_that_of_a_direct_solver():
+    scene = tf.Scene(bodies=[bar(1e6), bar(1e9, position=(0, 0.5, 0))], tolerance=1e-12)
+    simulation = tf.Simulation(scene, precision="f64")
+    K, m = simulation.stiffness(), np.repeat(simulation.masses, 3)
+    free = (np.repeat(simulation.rest_positions[:, 0], 3) > 1e-6).nonzero()[0]
+    A = (scipy.sparse.diags_array(m) + simulation.dt**2 * K).tocsc()[free][:, free]
+    gravity = np.tile(scene.gravity, len(simulation.masses))
+    expected = scipy.sparse.linalg.spsolve(A, (simulation.dt * m * gravity)[free])
+    simulation.step()
+    assert simulation.velocities.ravel()[free] == pytest.approx(expected, rel=1e-8, abs=1e-9 * abs(expected).max())
+
+
+def test_block_jacobi_gives_the_same_answer_in_more_iterations():
+    ends, iterations = [], []
+    for solver in ("multilevel", "block-jacobi"):
+        simulation = tf.Simulation(tf.Scene(bodies=[bar()], solver=solver, tolerance=1e-10), precision="f64")
+        simulation.step()
+        assert simulation.report.converged
+        ends.append(simulation.positions)
+        iterations.append(simulation.report.iterations)
+    assert ends[1] == pytest.approx(ends[0], abs=1e-9)
+    assert iterations[1] > 4 * iterations[0]
+
+
+def test_an_operation_a_launch_gives_the_same_bits(monkeypatch):
+    """The way that other devices than the CPU go."""
+    ends = []
+    for arch in ("cpu", "any other"):
+        monkeypatch.setattr(crew.runtime, "running_arch", lambda arch=arch: arch)
+        simulation = tf.Simulation(tf.Scene(bodies=[bar(), bar(1e4, pins=(), position=(0, 1, 0))]))
+        simulation.advance(seconds=0.05)
+        ends.append(simulation.positions)
+    assert np.array_equal(*ends)
+
+
+def coarse_matrix(simulation):
+    """The Galerkin matrix of the first level as the world has it, and as Z^T A Z with Z written out."""
+    w, found, levels = simulation._world, simulation._layout.aggregates, simulation._levels
+    n, count = simulation._counts.nodes, found.first[1]
+    x, pattern = simulation.positions[simulation._layout.node_order], simulation._pattern
+    with simulation._kernels():
+        blocks = transfer.read(w, w.block, len(levels.column))
+    last = levels.row_start[n + 2 * count]
+    start = levels.row_start[n : n + 2 * count + 1] - pattern.n_blocks
+    gathered = scipy.sparse.bsr_array(
+        (blocks[pattern.n_blocks : last], levels.column[pattern.n_blocks : last] - n, start)
+    )
+    A = np.zeros((n, n, 3, 3))
+    j = pattern.column[pattern.upper]
+    A[pattern.row, j] = blocks[pattern.upper]
+    A[j, pattern.row] = blocks[pattern.upper].transpose(0, 2, 1)
+    Z = np.zeros((n, 3, 6 * count))
+    for g in range(count):
+        nodes = np.arange(found.begin[g], found.end[g])
+        arm = x[nodes] - x[nodes].mean(axis=0)
+        arm /= np.sqrt((arm**2).sum(axis=1).mean())
+        Z[nodes, :, 6 * g : 6 * g + 3] = np.eye(3)
+        Z[nodes, :, 6 * g + 3 : 6 * g + 6] = np.cross(np.eye(3)[None], arm[:, None]).transpose(0, 2, 1)
+    Z[x[:, 0] < 1e-6] = 0
+    Z = Z.reshape(3 * n, -1)
+    return gathered.toarray(), Z.T @ A.transpose(0, 2, 1, 3).reshape(3 * n, 3 * n) @ Z
+
+
+def test_the_coarse_matrix_is_that_of_the_rigid_motions_of_aggregates():
+    simulation = tf.Simulation(tf.Scene(bodies=[bar()]), precision="f64")
+    simulation.step()
+    with simulation._kernels():
+        simulation._galerkin.renew(simulation._world)  # at the positions that we can read
+    gathered, expected = coarse_matrix(simulation)
+    assert gathered == pytest.approx(expected, abs=1e-12 * abs(expected).max())
+
+
+@pytest.mark.parametrize("precision", ["f32", "f64"])
+def test_smoothing_converges_for_every_spread_of_the_spectrum(precision):
+    """D^-1 A has no eigenvalue above 4, so that the weight below 1/2 is safe: near-incompressible, deformed, held."""
+    simulation = tf.Simulation(tf.Scene(bodies=[bar(1e9, poisson=0.499)]), precision=precision)
+    simulation.advance(seconds=0.05)
+    K = simulation.stiffness().tobsr((3, 3))
+    n, row = len(simulation.masses), np.repeat(np.arange(K.shape[0] // 3), np.diff(K.indptr))
+    half = [np.linalg.inv(np.linalg.cholesky(block)) for block in K.data[row == K.indices]]
+    D = scipy.sparse.block_diag(half).tocsr()
+    largest = scipy.sparse.linalg.eigsh(D @ K @ D.T, k=1, which="LA", return_eigenvectors=False)[0]
+    assert n and 2 < largest < 4
+
+
+def test_bodies_of_very_different_stiffness_on_the_ground():
+    soft = [tf.TetMesh.bar(size=(0.3, 0.3, 0.3), cells=(4, 4, 4))] * 5
+    bodies = [
+        tf.Body(mesh=mesh, material=tf.Material(youngs=10.0 ** (4 + k)), position=(0.5 * k, 0, 0.05))
+        for k, mesh in enumerate(soft)
+    ]
+    simulation = tf.Simulation(tf.Scene(bodies=bodies, colliders=[tf.PlaneCollider(friction=0.5)]))
+    most = 0
+    for _ in range(60):
+        simulation.step()
+        assert simulation.report.converged
+        most = max(most, simulation.report.iterations / max(1, simulation.report.contact_passes))
+    assert most <= 40
+    assert np.isfinite(simulation.positions).all()
