@@ -64,7 +64,7 @@ class Plan:
         self.cubes = {text: cubes_across(tets(text)) for text in _listed(options.sizes)}
         self.moduli = _each(options.stiffness, modulus)
         self.solvers = _each(options.solver, lambda text: _known("--solver", text, SOLVERS))
-        self.peers = _each(options.against, lambda text: _known("--against", text, PEERS))
+        self.peers = _each(options.against, lambda text: _known("--against", text, PEERS)) if options.against else []
         self.interpreters = interpreters(options.peer_python)
         self.material = {"model": options.model, "poisson": options.poisson}
         self.machine = {"precision": options.precision, "arch": options.arch, "threads": options.threads}
@@ -120,8 +120,8 @@ def _listed(text: str) -> list[str]:
 
 
 def _each(text: str, read: Callable[[str], T]) -> list[T]:
-    """What a list says, without repetitions; none if it is empty."""
-    return list(dict.fromkeys(read(part) for part in _listed(text))) if text.strip() else []
+    """What a list says, without repetitions."""
+    return list(dict.fromkeys(read(part) for part in _listed(text)))
 
 
 def _known(option: str, text: str, known: Iterable[str]) -> str:

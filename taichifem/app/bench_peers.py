@@ -28,8 +28,8 @@ class Peer:
 PEERS = {
     "mujoco": Peer(script="mujoco_flex.py", packages="mujoco"),
     "pybullet": Peer(script="pybullet_soft.py", packages="pybullet"),
-    "newton": Peer(script="newton_soft.py", packages="newton warp-lang", mode="vbd"),
-    "newton-semi-implicit": Peer(script="newton_soft.py", packages="newton warp-lang", mode="semi-implicit"),
+    "newton": Peer(script="newton_soft.py", packages="newton", mode="vbd"),
+    "newton-semi-implicit": Peer(script="newton_soft.py", packages="newton", mode="semi-implicit"),
     "genesis": Peer(script="genesis_fem.py", packages="torch genesis-world"),
     "taichi-example": Peer(script="taichi_example.py", packages="taichi"),
 }

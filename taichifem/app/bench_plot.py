@@ -8,8 +8,8 @@ from taichifem.errors import InputError
 from taichifem.files import need_place, replacing
 
 SUFFIXES = (".png", ".pdf", ".svg")
-# Okabe and Ito's, told apart by the colour-blind too; without the pale yellow.
-COLORS = ("#0072B2", "#D55E00", "#009E73", "#CC79A7", "#E69F00", "#56B4E9", "#000000")
+# Okabe and Ito's, told apart by the colour-blind too, with wine in place of the pale yellow.
+COLORS = ("#0072B2", "#D55E00", "#009E73", "#CC79A7", "#E69F00", "#56B4E9", "#000000", "#882255")
 MARKERS = "os^Dv*P"
 REAL_TIME = 1e3 / 60  # [ms]
 GREY = "#666666"
@@ -29,15 +29,20 @@ def need_plot(path: Path) -> None:
 def write_plot(path: Path, rows: list[dict], peers: list[dict]) -> None:
     """Draw a line for each stiffness and solver of ours, and for each peer and stiffness. Raises InputError."""
     from matplotlib.figure import Figure
+    from matplotlib.ticker import NullLocator, StrMethodFormatter
 
-    figure = Figure(figsize=(8.5, 5), layout="constrained")
-    axes = figure.add_subplot(xscale="log", yscale="log", xlabel="tetrahedra", ylabel="time of a step of 1/60 s [ms]")
     lines = curves(rows, peers)
+    sizes = sorted({tets for curve in lines.values() for tets, _ in curve["points"]})
+    figure = Figure(figsize=(9, 5), layout="constrained")
+    axes = figure.add_subplot(xscale="log", yscale="log", xlabel="tetrahedra", ylabel="time of a frame of 1/60 s [ms]")
     for name, curve in sorted(lines.items(), key=lambda item: -item[1]["points"][-1][1]):  # as they lie at the right
         axes.plot(*zip(*curve["points"], strict=True), label=name, **curve["style"])
-    _guides(axes, lines)
+    _guides(axes, sizes, next(iter(lines.values()))["points"][-1])
+    axes.set_xticks(sizes)
+    axes.xaxis.set(major_formatter=StrMethodFormatter("{x:,.0f}"), minor_locator=NullLocator())
+    axes.yaxis.set(major_formatter=StrMethodFormatter("{x:,g}"))
     axes.legend(loc="upper left", bbox_to_anchor=(1.01, 1), borderaxespad=0, frameon=False)
-    axes.grid(which="major", color="#dddddd", linewidth=0.6)
+    axes.grid(which="major", color="#e4e4e4", linewidth=0.6)
     axes.spines[["top", "right"]].set_visible(False)
     with replacing(path) as part:
         figure.savefig(part, format=path.suffix[1:].lower(), dpi=160)
@@ -54,7 +59,7 @@ def curves(rows: list[dict], peers: list[dict]) -> dict[str, dict]:
     moduli = sorted({row["youngs"] for _, row in programs})
     found: dict[str, dict] = {}
     for name, row in programs:
-        label = name if len(moduli) == 1 else f"{name}, {row['youngs']:g} Pa"
+        label = name if len(moduli) == 1 else f"{name}, {row['youngs'] / 1e6:g} MPa"
         kind = names.index(name)
         style = {
             "color": COLORS[kind % len(COLORS)],
@@ -67,20 +72,9 @@ def curves(rows: list[dict], peers: list[dict]) -> dict[str, dict]:
     return found
 
 
-def _guides(axes, lines: dict[str, dict]) -> None:
-    """The time of real time, and what growth in proportion to the size looks like."""
-    sizes = [tets for curve in lines.values() for tets, _ in curve["points"]]
-    low, high = min(sizes), max(sizes)
-    axes.axhline(REAL_TIME, color=GREY, linewidth=1)
-    axes.annotate(
-        "60 frames a second",
-        (1, REAL_TIME),
-        xycoords=("axes fraction", "data"),
-        xytext=(-3, 3),
-        textcoords="offset points",
-        ha="right",
-        color=GREY,
-    )
-    if high > low:
-        tets, ms = next(iter(lines.values()))["points"][-1]
-        axes.plot([low, high], [ms * low / tets, ms * high / tets], "--", color=GREY, linewidth=1, label="slope 1")
+def _guides(axes, sizes: list[int], end: tuple[int, float]) -> None:
+    """The time of real time, and growth in proportion to the size, through the end of the first line."""
+    if len(sizes) > 1:
+        ends = [sizes[0], sizes[-1]]
+        axes.plot(ends, [end[1] * tets / end[0] for tets in ends], "--", color=GREY, linewidth=1, label="slope 1")
+    axes.axhline(REAL_TIME, color=GREY, linewidth=1, label="60 frames a second")
