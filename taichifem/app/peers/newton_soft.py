@@ -9,7 +9,6 @@ import newton
 import numpy as np
 import warp as wp
 
-SHARE = 0.5  # of the time a wave needs across an element: explicit steps beyond fly apart
 SUBSTEPS, ITERATIONS = 10, 10  # of vertex block descent, as in Newton's own examples
 
 
@@ -50,7 +49,7 @@ def build(task: common.Task):
                 particle_enable_tile_solve=False,
             )
         states, control = [model.state(), model.state()], model.control()
-    substeps = task.stable_substeps(SHARE) if explicit else SUBSTEPS
+    substeps = task.explicit_substeps if explicit else SUBSTEPS
 
     def frame() -> None:
         for _ in range(substeps):

@@ -9,8 +9,6 @@ import common
 import numpy as np
 import pybullet
 
-SHARE = 0.5  # of the time a wave needs across an element: explicit steps beyond fly apart
-
 
 def build(task: common.Task):
     pybullet.connect(pybullet.DIRECT)
@@ -34,7 +32,7 @@ def build(task: common.Task):
     )
     for node in task.held:
         pybullet.createSoftBodyAnchor(body, int(node), -1, -1)
-    substeps = task.stable_substeps(SHARE)
+    substeps = task.explicit_substeps
     pybullet.setTimeStep(1 / (common.FPS * substeps))
 
     def frame() -> None:
