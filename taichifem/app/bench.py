@@ -72,19 +72,19 @@ def _one_size(plan: Plan, options: BenchOptions, label: str, m: int, folder: Pat
             yield "rows", row
         for name in plan.peers:
             with _telling(f"{what}, {name}"):
-                task = _task(ours, folder / "bar.npz")
+                task = {**_task(ours, folder / "bar.npz"), "steps": options.steps}
                 figures = measure_peer(name, task, python=plan.interpreters[name], limit=options.peer_limit)
             asked = {key: ours[key] for key in ("size", "tets", "youngs", "poisson")}
             yield "peers", {"peer": name, **asked, **figures, **beside(ours, figures)}
 
 
 def _task(ours: dict, file: Path) -> dict:
-    """What a peer is to do to do the same; writes the mesh to `file`."""
+    """What a peer needs to know to do the same; writes the mesh to `file`."""
     if not file.exists():
         mesh = bar_mesh(ours["m"])
         np.savez(file, points=mesh.points, tets=mesh.cells)
     same = {key: ours[key] for key in ("youngs", "poisson", "threads", "budget")}
-    return {"mesh": str(file), **same, "density": DENSITY, "gravity": GRAVITY, "steps": ours["steps"]}
+    return {"mesh": str(file), **same, "density": DENSITY, "gravity": GRAVITY}
 
 
 def _measure(bar: Bar, environment: dict[str, str], what: str) -> dict:

@@ -59,8 +59,8 @@ class Plan:
         for name, seconds in (("--budget", options.budget), ("--peer-limit", options.peer_limit)):
             if not seconds > 0:
                 raise InputError(f"{name} is {seconds:g}: give seconds above 0")
-        if not 0 <= options.poisson < 0.5:
-            raise InputError(f"--poisson is {options.poisson:g}: give a number from 0 to below 0.5")
+        if not -1 < options.poisson < 0.5:
+            raise InputError(f"--poisson is {options.poisson:g}: give a number above -1 and below 0.5")
         self.cubes = {text: cubes_across(tets(text)) for text in _listed(options.sizes)}
         self.moduli = _each(options.stiffness, modulus)
         self.solvers = _each(options.solver, lambda text: _known("--solver", text, SOLVERS))
@@ -108,9 +108,10 @@ def interpreters(given: Iterable[str]) -> dict[str, str]:
     for text in given:
         name, _, path = text.partition("=")
         _known("--peer-python", name, PEERS)
-        if shutil.which(path) is None:
+        program = shutil.which(os.path.expanduser(path))
+        if program is None:
             raise InputError(f"--peer-python {text}: {path or 'nothing'!r} is no program: write {name}=/path/to/python")
-        named[name] = os.path.abspath(shutil.which(path))  # not resolved: the link tells the environment
+        named[name] = os.path.abspath(program)  # not resolved: the link tells the environment
     same = {PEERS[name].script: path for name, path in named.items()}  # what runs newton runs newton-semi-implicit
     return {name: named.get(name, same.get(peer.script, sys.executable)) for name, peer in PEERS.items()}
 

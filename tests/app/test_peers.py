@@ -32,7 +32,7 @@ LOST = SOUND.replace("-= 1e-3", "-= float('nan')")
 SCRIPTS = {
     "sound": SOUND,
     "lost": LOST,
-    "far": SOUND.replace("-= 1e-3", "-= 3.0"),
+    "far": SOUND.replace("-= 1e-3", "-= 30.0"),
     "missing": "import no_such_module_at_all",
     "crash": "raise RuntimeError('no GPU here')",
     "killed": "import os\nos.kill(os.getpid(), 9)",

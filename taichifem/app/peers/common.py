@@ -18,7 +18,7 @@ import numpy as np
 FPS = 60
 WARM_UP = 5
 SHARE = 0.8  # of the time a pressure wave needs across an element: explicit steps of 1.0 were seen to fly apart
-REACH = 10.0  # [m] no tip of a sound bar gets that far
+REACH = 100.0  # [m] no tip of a sound bar gets that far within the frames of a bench
 
 
 @dataclass(frozen=True, kw_only=True)
