@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from taichifem.app.bench_against import against, told
 from taichifem.app.bench_growth import LARGE
+from taichifem.app.bench_peers import TAIL
 from taichifem.app.console import console, table
 
 
@@ -17,7 +18,7 @@ def print_report(*, rows: list[dict], peers: list[dict], growth: list[dict]) -> 
     if peers:
         screen.print(
             "\nThe same bar in other programs: time of a frame, median (10th to 90th percentile) [ms], and where the "
-            "tip is [m],\nat the lowest and in the mean of the last frames, beside ours after the same frames",
+            f"tip is [m],\nat the lowest and in the mean of the last {TAIL} frames, beside ours after as many frames",
             against(rows, peers),
             sep="\n",
         )
