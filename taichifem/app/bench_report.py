@@ -2,14 +2,26 @@
 
 from __future__ import annotations
 
+from taichifem.app.bench_against import against, told
+from taichifem.app.bench_growth import LARGE
+from taichifem.app.bench_peers import TAIL
 from taichifem.app.console import console, table
 
 
-def print_report(rows: list[dict]) -> None:
-    """Print two tables: what a step takes, and what surrounds it."""
+def print_report(*, rows: list[dict], peers: list[dict], growth: list[dict]) -> None:
+    """Print what a step takes and how that grows, what surrounds it, and how other programs do."""
     screen = console()
     screen.print("Time per step: median (10th to 90th percentile) [ms], of which in each phase", _steps(rows), sep="\n")
+    for line in growth:
+        screen.print(_growth(line))
     screen.print("\nStart, memory, result", _start(rows), sep="\n")
+    if peers:
+        screen.print(
+            "\nThe same bar in other programs: time of a frame, median (10th to 90th percentile) [ms], and where the "
+            f"tip is [m],\nat the lowest and in the mean of the last {TAIL} frames, beside ours after as many frames",
+            against(rows, peers),
+            sep="\n",
+        )
     probes = ", ".join(f"{row['probe_ms']:.1f}" for row in rows)
     screen.print(f"\nSpeed of the machine meanwhile: a fixed piece of NumPy took {probes} ms.")
 
@@ -17,21 +29,31 @@ def print_report(rows: list[dict]) -> None:
 def _steps(rows: list[dict]):
     phases = list(dict.fromkeys(name for row in rows for name in row["phases_ms"]))
     right = ("E [Pa]", "steps", "ms a step", *phases, "CG iterations", "residual", "x real time")
-    listing = table("tets", *right, right=("tets", *right))
+    listing = table("tets", "solver", *right, right=("tets", *right))
     for row in rows:
-        ms, counts = row["ms"], row["iterations"]
+        counts = row["iterations"]
         capped = f", {row['capped_steps']} capped" if row["capped_steps"] else ""
         listing.add_row(
             f"{row['tets']:,}",
+            row["solver"],
             f"{row['youngs']:g}",
             str(row["steps"]),
-            f"{ms['median']:.2f} ({ms['p10']:.2f}-{ms['p90']:.2f})",
+            told(row["ms"]),
             *(f"{row['phases_ms'][name]['median']:.2f}" if name in row["phases_ms"] else "" for name in phases),
             f"{counts['median']:.0f} (most {counts['max']}{capped})",
             f"{row['residual']:.1e}",
             f"{row['real_time_factor']:.2f}",
         )
     return listing
+
+
+def _growth(line: dict) -> str:
+    tets = line["tets"]
+    small = "" if tets[0] >= LARGE else "; fixed costs count there"
+    return (
+        f"E = {line['youngs']:g} Pa, {line['solver']}: the time grows with the number of tetrahedra to the power "
+        f"{line['exponent']:.2f} (from {tets[0]:,} to {tets[-1]:,}{small})"
+    )
 
 
 def _start(rows: list[dict]):

@@ -12,12 +12,12 @@ import sys
 import time
 from dataclasses import dataclass
 
+from taichifem.app.peers.common import FPS, drive, peak_mib, spread
 from taichifem.errors import InputError
 
 LENGTH, SIDE = 1.0, 0.25  # [m]
-POISSON, DENSITY, GRAVITY = 0.4, 1000.0, 9.81
-FPS = 60
-WARM_UP = 5
+DENSITY, GRAVITY = 1000.0, 9.81
+SOLVERS = ("multilevel", "block-jacobi")
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -29,12 +29,21 @@ class Bar:
 
     m: int
     youngs: float = 1e6
+    poisson: float = 0.4
     model: str = "corotational"
+    solver: str = SOLVERS[0]
     precision: str = "f32"
     arch: str | None = None
     threads: int | None = None
     steps: int = 60
     budget: float = 45.0
+
+
+def bar_mesh(m: int):
+    """The mesh of a Bar."""
+    from taichifem.mesh import TetMesh
+
+    return TetMesh.bar(size=(LENGTH, SIDE, SIDE), cells=(4 * m, m, m))
 
 
 def measure(bar: Bar) -> dict:
@@ -44,119 +53,62 @@ def measure(bar: Bar) -> dict:
     begin = time.perf_counter()
     start_taichi(bar.arch, bar.threads)
     started = time.perf_counter()
-    from taichifem import BoxRegion, TetMesh
-
-    mesh = TetMesh.bar(size=(LENGTH, SIDE, SIDE), cells=(4 * bar.m, bar.m, bar.m))
-    held = BoxRegion(lower=(-1.0, -1.0, -1.0), upper=(1e-6, 1.0, 1.0))
-    simulation, setup = _set_up(bar, mesh, held)
+    mesh = bar_mesh(bar.m)
+    simulation, setup = _set_up(bar, mesh)
     figures = {"nodes": len(mesh.points), "tets": len(mesh.cells), "taichi_s": started - begin, "setup_s": setup}
-    tip = mesh.points[:, 0] > LENGTH - 1e-9
-    figures["first_step_s"] = _timed_step(simulation) / 1e3
-    if bar.steps:
-        figures |= _steps(simulation, tip, bar)
-    return figures | {"timoshenko_m": -timoshenko(bar.youngs), "peak_mib": peak_mib()}
+    figures |= _steps(simulation, mesh.points[:, 0] > LENGTH - 1e-9, bar)
+    return figures | {"timoshenko_m": -timoshenko(bar.youngs, bar.poisson), "peak_mib": peak_mib()}
 
 
-def _set_up(bar: Bar, mesh, held) -> tuple:
-    from taichifem import Body, Material, Scene, Simulation
+def _set_up(bar: Bar, mesh) -> tuple:
+    from taichifem import Body, BoxRegion, Material, Scene, Simulation
 
-    material = Material(model=bar.model, youngs=bar.youngs, poisson=POISSON, density=DENSITY)
+    material = Material(model=bar.model, youngs=bar.youngs, poisson=bar.poisson, density=DENSITY)
+    held = BoxRegion(lower=(-1.0, -1.0, -1.0), upper=(1e-6, 1.0, 1.0))
     body = Body(mesh=mesh, material=material, pins=[held])
-    scene = Scene(bodies=[body], gravity=(0.0, 0.0, -GRAVITY), fps=FPS)
+    chosen = {} if bar.solver == SOLVERS[0] else {"solver": bar.solver}
+    scene = Scene(bodies=[body], gravity=(0.0, 0.0, -GRAVITY), fps=FPS, **chosen)
     begin = time.perf_counter()
     simulation = Simulation(scene, precision=bar.precision, arch=bar.arch, threads=bar.threads)
     return simulation, time.perf_counter() - begin
 
 
-def _timed_step(simulation) -> float:
-    """Wall time of one step [ms]."""
-    begin = time.perf_counter()
-    simulation.step()
-    return 1e3 * (time.perf_counter() - begin)
-
-
 def _steps(simulation, tip, bar: Bar) -> dict:
-    """Warm up, then time steps, one by one."""
-    heights = []
-    for _ in range(WARM_UP - 1):  # the first step was one
-        simulation.step()
-        heights.append(_height(simulation, tip))
-    probe = [probe_ms()]
-    steps, phases, iterations, residuals, capped = [], {}, [], [], 0
-    end = time.perf_counter() + bar.budget
-    while len(steps) < bar.steps and (not steps or time.perf_counter() < end):
-        steps.append(_timed_step(simulation))
+    """What the steps took, and what each of them tells about itself."""
+    phases, reports = {}, []
+
+    def note() -> None:
         # The timer and the report themselves: `simulation.stats` also computes stresses, which warms caches up.
         for name, ms in simulation.phases.items():
             phases.setdefault(name, []).append(ms)
-        report = simulation.report
-        iterations.append(report.iterations)
-        residuals.append(report.residual)
-        capped += not report.converged
-        heights.append(_height(simulation, tip))
-    probe.append(probe_ms())
-    ms = spread(steps)
-    return {
-        "steps": len(steps),
-        "ms": ms,
+        reports.append(simulation.report)
+
+    def deflection() -> float:
+        return float(simulation.positions[tip, 2].mean()) - SIDE / 2
+
+    figures = drive(simulation.step, deflection, steps=bar.steps, budget=bar.budget, after=note)
+    if not bar.steps:
+        return figures
+    iterations = [report.iterations for report in reports]
+    return figures | {
         "phases_ms": {name: spread(values) for name, values in phases.items()},
-        "real_time_factor": 1e3 / FPS / ms["median"],
+        "real_time_factor": 1e3 / FPS / figures["ms"]["median"],
         "iterations": {"median": statistics.median(iterations), "max": max(iterations)},
-        "capped_steps": capped,
-        "residual": max(residuals),
-        "tip_m": heights[-1] - SIDE / 2,
-        "tip_lowest_m": min(heights) - SIDE / 2,
-        "probe_ms": sum(probe) / 2,
+        "capped_steps": sum(not report.converged for report in reports),
+        "residual": max(report.residual for report in reports),
     }
 
 
-def _height(simulation, tip) -> float:
-    return float(simulation.positions[tip, 2].mean())
-
-
-def spread(values: list[float]) -> dict[str, float]:
-    """Median and the tenth and ninetieth percentile."""
-    ordered = sorted(values)
-    last = len(ordered) - 1
-    return {"median": statistics.median(ordered), "p10": ordered[round(0.1 * last)], "p90": ordered[round(0.9 * last)]}
-
-
-def timoshenko(youngs: float) -> float:
+def timoshenko(youngs: float, poisson: float) -> float:
     """Static deflection [m] of the free end of the bar under its weight, for small displacement.
 
     Bending and shear, with Cowper's shear coefficient of a rectangle (1966).
     """
     area, inertia = SIDE**2, SIDE**4 / 12
     load = DENSITY * GRAVITY * area
-    shear_modulus = youngs / (2 * (1 + POISSON))
-    coefficient = 10 * (1 + POISSON) / (12 + 11 * POISSON)
+    shear_modulus = youngs / (2 * (1 + poisson))
+    coefficient = 10 * (1 + poisson) / (12 + 11 * poisson)
     return load * LENGTH**4 / (8 * youngs * inertia) + load * LENGTH**2 / (2 * coefficient * shear_modulus * area)
-
-
-def probe_ms(repeats: int = 7) -> float:
-    """Time [ms] of a fixed piece of NumPy on one thread: tells how fast the machine is just now."""
-    import numpy as np
-
-    rng = np.random.default_rng(0)
-    index, x, weights = rng.integers(0, 1 << 16, 1 << 20), rng.standard_normal(1 << 16), rng.standard_normal(1 << 20)
-    times = []
-    for _ in range(repeats):
-        begin = time.perf_counter()
-        float((x[index] * weights).sum())
-        times.append(1e3 * (time.perf_counter() - begin))
-    return statistics.median(times)
-
-
-def peak_mib() -> float:
-    """Most memory this process has held [MiB]."""
-    try:
-        with open("/proc/self/status", encoding="ascii", errors="replace") as file:
-            return next(float(line.split()[1]) / 1024 for line in file if line.startswith("VmHWM"))
-    except (OSError, StopIteration):
-        import resource  # not on Windows
-
-        unit = 2**20 if sys.platform == "darwin" else 1024
-        return resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / unit
 
 
 if __name__ == "__main__":

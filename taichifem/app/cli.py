@@ -182,27 +182,50 @@ def info() -> None:
 
 
 @cli.command()
-@click.option("--sizes", default="1k,5k,20k,100k", show_default=True, help="Numbers of tetrahedra, roughly met.")
+@click.option("--sizes", default="1k,5k,20k,100k", show_default=True, help="Numbers of tetrahedra, up to 5m.")
 @click.option("--stiffness", default="1e6", show_default=True, help="Young's moduli [Pa], separated by commas.")
+@click.option("--poisson", type=float, default=0.4, show_default=True, help="Poisson's ratio.")
 @click.option("--model", type=click.Choice(MODELS), default="corotational", show_default=True, help="Of the material.")
+@click.option("--solver", default="multilevel", show_default=True, help="Linear solvers: multilevel,block-jacobi.")
 @click.option("--steps", type=click.IntRange(min=1), default=60, show_default=True, help="Timed steps, at most.")
 @click.option("--budget", type=float, default=45.0, show_default=True, help="Seconds for them, at most.")
 @click.option("--no-cold", is_flag=True, help="Leave out the start with an empty kernel cache.")
+@click.option(
+    "--against",
+    default="",
+    metavar="LIST",
+    help="Other programs: mujoco,pybullet,newton,newton-semi-implicit,genesis,taichi-example.",
+)
+@click.option(
+    "--peer-python",
+    multiple=True,
+    metavar="NAME=PYTHON",
+    help="The Python of an environment that has that program. May be given again.  [default: this one]",
+)
+@click.option("--peer-limit", type=float, default=300.0, show_default=True, help="Seconds for one program and bar.")
 @click.option("--json", "json_file", type=FILE, metavar="FILE", help="Write all figures to this file, too.")
+@click.option("--plot", type=FILE, metavar="FILE", help="Draw time over size: .png, .pdf or .svg.")
 @machine_options()
 def bench(**options: Any) -> None:
     """Measure speed, start-up and memory.
 
     Each bar (1 x 0.25 x 0.25 m, one end held, released at rest, 60 steps a second) runs in a process of its own.
 
+    --against runs the same bar in other programs, on the CPU, in turn with ours: same mesh, stiffness, density and
+    frames. A program that is not installed gets a row that says how to get it. Where the tip is tells whether a
+    program that is fast is also right.
+
     \b
     Examples:
       taichifem bench --sizes 1k,5k --no-cold
       taichifem bench --stiffness 1e5,1e6,1e7 --json bench.json
+      taichifem bench --sizes 1k,5k,20k,100k,1m --plot bench.png     needs: pip install "taichifem[plot]"
+      taichifem bench --sizes 5k --against mujoco,newton --peer-python newton=~/newton/bin/python
     """
     from taichifem.app.bench import run_bench
+    from taichifem.app.bench_input import BenchOptions
 
-    run_bench(**options)
+    run_bench(BenchOptions(**options))
 
 
 def main() -> None:
