@@ -12,13 +12,14 @@ from taichifem.errors import InputError
 from taichifem.integrators import EXACT, symplectic_euler
 from taichifem.laws import Laws
 from taichifem.layout import AXES, Layout, lay_out
-from taichifem.linear_algebra import assembly, balance
+from taichifem.linear_algebra import assembly, balance, bandwidth
+from taichifem.linear_algebra.bandwidth import Bandwidth
 from taichifem.linear_algebra.galerkin import Galerkin
-from taichifem.linear_algebra.levels import Levels, stack_levels
-from taichifem.linear_algebra.pattern import BlockPattern, block_pattern
 from taichifem.linear_algebra.program import write_program
 from taichifem.linear_algebra.spectrum import highest_frequency
 from taichifem.processes.loading import Loading
+from taichifem.structure.levels import Levels, stack_levels
+from taichifem.structure.pattern import BlockPattern, block_pattern, to_sparse
 from taichifem.surroundings import Surroundings, pose
 from taichifem.world import Capacity, Counts, World, acquire
 
@@ -259,14 +260,12 @@ class Bodies:
             self._laws.deform(self._world, self._counts, stiffness=1.0, projected=projected)
             assembly.assemble(self._world, self._counts.pairs, 0.0, 0.0)
             blocks = transfer.read(self._world, self._world.block, pattern.n_blocks).astype(np.float64)
-        n, order = 3 * self._counts.nodes, self._layout.node_order
-        row, off = order[pattern.row], np.flatnonzero(pattern.lower != pattern.upper)
-        column, block = order[pattern.column[pattern.upper]], blocks[pattern.upper]
-        row, column = np.r_[row, column[off]], np.r_[column, row[off]]
-        block = np.concatenate([block, block[off].transpose(0, 2, 1)])
-        by_row = np.lexsort((column, row))
-        start = np.r_[0, np.cumsum(np.bincount(row))]
-        return scipy.sparse.bsr_matrix((block[by_row], column[by_row], start), shape=(n, n)).tocsr()
+        return to_sparse(pattern, blocks, self._layout.node_order)
+
+    def product_bandwidth(self) -> Bandwidth:
+        """How fast the linear solver's matrix product is, against a plain read; after a step of an implicit method."""
+        with self._kernels():
+            return bandwidth.measure(self._world, self._counts, self._pattern.n_blocks)
 
     def _measure(self) -> None:
         with self._kernels():

@@ -155,7 +155,9 @@ def deform(
         strain = _strain(F, R, w, e) + (ti.cast(rate_factor, w.real) + ti.cast(rate_damping, w.real) * damping) * rate
         stress = R @ hooke.stress(strain, row[LAMBDA], row[MU])
         volume = w.volume[e]
-        w.h[e] = with_first(gradients @ R.transpose())
+        h = with_first(gradients @ R.transpose())
+        for a in ti.static(range(w.corners)):
+            w.h[e * w.corners + a] = ti.Vector([h[a, k] for k in ti.static(range(w.d))])
         w.corner_force[e] = with_first(-volume * (gradients @ stress.transpose()))
         factor = ti.cast(stiffness_factor, w.real) + ti.cast(damping_factor, w.real) * damping
         w.moduli[e] = volume * factor * ti.Vector([row[LAMBDA], row[MU]])

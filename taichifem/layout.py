@@ -10,7 +10,7 @@ import numpy as np
 
 from taichifem.description import Body, Handle, Load, Material, Motion, Pin, Region, Scene
 from taichifem.errors import InputError
-from taichifem.linear_algebra.aggregates import Aggregates, aggregate
+from taichifem.structure.aggregates import Aggregates, aggregate
 
 AXES = {2: [0, 2], 3: [0, 1, 2]}
 """Coordinates that matter to bodies of dimension 2 (in the plane y = 0) and 3."""

@@ -28,6 +28,10 @@ if sys.platform.startswith("linux"):
 import taichi as ti
 from taichi.lang import impl
 
+from taichifem.quick_start import quicken
+
+quicken()
+
 ARCHES = ("cpu", "cuda", "vulkan", "metal")
 PRECISIONS = {"f32": ti.f32, "f64": ti.f64}
 

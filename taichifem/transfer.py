@@ -3,10 +3,10 @@
 import numpy as np
 
 from taichifem.layout import Layout
-from taichifem.linear_algebra.aggregates import Aggregates
-from taichifem.linear_algebra.levels import Levels
-from taichifem.linear_algebra.pattern import BlockPattern
 from taichifem.runtime import PRECISIONS, ti
+from taichifem.structure.aggregates import Aggregates
+from taichifem.structure.levels import Levels
+from taichifem.structure.pattern import BlockPattern
 from taichifem.world import World
 
 _array = ti.types.ndarray

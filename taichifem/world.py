@@ -12,8 +12,8 @@ import weakref
 from dataclasses import astuple, dataclass
 
 from taichifem import runtime
-from taichifem.linear_algebra.pattern import PIECES
 from taichifem.runtime import ti
+from taichifem.structure.pattern import PIECES
 
 MOST_LEVELS = 12
 """Coarse levels of the solver at most: far more than memory would ever need."""
@@ -78,6 +78,7 @@ class Counts:
     colliders: int = 0
     held: int = 0
     pulled: int = 0
+    sprung: bool = True  # may some springs of handles or contact be left from the last step?
 
 
 @ti.data_oriented
@@ -90,7 +91,7 @@ class World:
     step, `base_x` and `base_v`: what an implicit step starts from (`integrators.implicit`).
     Elements: `cell` nodes (d+1), `material` row, `gradients` rows g_1..g_d of D_m^-1 (B of the slides), `volume`
     [m^3], `rotation` quaternion, `plastic` strain (xx, yy, zz, xy, yz, zx), `body`, and per step `h` (rotated
-    gradients) and `corner_force` [N].
+    gradients, corner by corner) and `corner_force` [N].
     """
 
     def __init__(self, capacity: Capacity, precision: str) -> None:
@@ -141,7 +142,7 @@ class World:
         self.material, self.body = self._scalar(m, ti.i32), self._scalar(m, ti.i32)
         self.gradients, self.volume = self._matrix(m, d, d), self._scalar(m)
         self.rotation, self.plastic = self._vector(m, 4), self._vector(m, 6)
-        self.h, self.corner_force = self._matrix(m, corners, d), self._matrix(m, corners, d)
+        self.h, self.corner_force = self._vector(corners * m, d), self._matrix(m, corners, d)
         self.moduli = self._vector(m, 2)  # lambda and mu, times the step's factor of K
         self.stress = self._matrix(m, 3, 3)
         self.energy = self._scalar(m)
@@ -157,7 +158,7 @@ class World:
 
     def _place_matrix(self) -> None:
         c = self.capacity
-        # Rows of the nodes, and below them those of the coarse levels (`linear_algebra.levels`).
+        # Rows of the nodes, and below them those of the coarse levels (`structure.levels`).
         rows, blocks = c.nodes + 2 * c.aggregates, c.blocks + c.coarse_blocks
         self.row_start, self.column = self._scalar(rows + 1, ti.i32), self._scalar(blocks, ti.i32)
         self.near = self._scalar(rows, ti.i32)  # where in a row the blocks begin that stand for their mirror images

@@ -13,7 +13,7 @@ from typing import TypeVar
 
 from taichifem.app.bench_peers import PEERS
 from taichifem.app.bench_plot import need_plot
-from taichifem.app.bench_worker import SOLVERS
+from taichifem.description.scene import SOLVERS
 from taichifem.errors import InputError
 from taichifem.files import need_place
 

@@ -15,6 +15,11 @@ def print_report(*, rows: list[dict], peers: list[dict], growth: list[dict]) -> 
     for line in growth:
         screen.print(_growth(line))
     screen.print("\nStart, memory, result", _start(rows), sep="\n")
+    screen.print(
+        "\nThe matrix product alone, against a plain read of the matrix by the same threads (best of a few)",
+        _products(rows),
+        sep="\n",
+    )
     if peers:
         screen.print(
             "\nThe same bar in other programs: time of a frame, median (10th to 90th percentile) [ms], and where the "
@@ -43,6 +48,23 @@ def _steps(rows: list[dict]):
             f"{counts['median']:.0f} (most {counts['max']}{capped})",
             f"{row['residual']:.1e}",
             f"{row['real_time_factor']:.2f}",
+        )
+    return listing
+
+
+def _products(rows: list[dict]):
+    columns = ("tets", "E [Pa]", "solver", "a product [ms]", "GB/s", "plain read [GB/s]", "share")
+    listing = table(*columns, right=tuple(c for c in columns if c != "solver"))
+    for row in rows:
+        product = row["product"]
+        listing.add_row(
+            f"{row['tets']:,}",
+            f"{row['youngs']:g}",
+            row["solver"],
+            f"{product['ms']:.3f}",
+            f"{product['gb_s']:.1f}",
+            f"{product['read_gb_s']:.1f}",
+            f"{product['gb_s'] / product['read_gb_s']:.0%}",
         )
     return listing
 

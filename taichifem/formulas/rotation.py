@@ -37,10 +37,12 @@ def nearest_rotation(F, start, tolerance, most: ti.i32):
     one or two iterations then suffice). With S = R^T F, the gradient is the axial vector a of S - S^T and the
     negative Hessian is H = tr(S) I - sym(S) (Kugelstadt, Koschier & Bender 2018). Where H is not positive
     definite (crushed and inverted elements), the gradient itself is the direction. Along an axis n the objective
-    is (n.H n) cos t + (n.a) sin t + const, so the best angle t is known exactly and every turn ascends.
+    is (n.H n) cos t / |n|^2 + (n.a) sin t / |n| + const, so the best angle t is known exactly and every turn ascends.
     Stops when a Newton turn is below `tolerance` [rad], or after `most` iterations.
     """
     q = start
+    # The scale of F does not matter; taken out, no product below can leave the range of numbers.
+    F = F / ti.max(F.norm(), 1e-30)
     left = most
     while left > 0:
         left -= 1
@@ -52,7 +54,8 @@ def nearest_rotation(F, start, tolerance, most: ti.i32):
         c00, c01, c02 = h11 * h22 - h12 * h12, h02 * h12 - h01 * h22, h01 * h12 - h02 * h11
         c11, c12, c22 = h00 * h22 - h02 * h02, h01 * h02 - h00 * h12, h00 * h11 - h01 * h01
         n = a
-        newton = h00 > 0 and c22 > 0 and h00 * c00 + h01 * c01 + h02 * c02 > 0
+        determinant = h00 * c00 + h01 * c01 + h02 * c02
+        newton = h00 > 0 and c22 > 0 and determinant > 0
         if newton:
             n = ti.Vector(
                 [
@@ -61,24 +64,22 @@ def nearest_rotation(F, start, tolerance, most: ti.i32):
                     c02 * a[0] + c12 * a[1] + c22 * a[2],
                 ]
             )
-        length = n.norm()
+            n /= determinant
+        square = n.norm_sqr()
+        rise = n.dot(a)
+        bend = h00 * n[0] * n[0] + h11 * n[1] * n[1] + h22 * n[2] * n[2]
+        bend += 2 * (h01 * n[0] * n[1] + h02 * n[0] * n[2] + h12 * n[1] * n[2])
+        size = ti.sqrt(rise * rise * square + bend * bend)
+        # tan(t/2) = sin t / (1 + cos t) = (1 - cos t) / sin t, whichever does not cancel; rise is never negative.
+        real, imaginary = size + bend, rise
+        if bend < 0:
+            real, imaginary = rise * square, size - bend
+        length = ti.sqrt(real * real + imaginary * imaginary * square)
         if length > 0:
-            n /= length
-            rise = n.dot(a)
-            bend = h00 * n[0] * n[0] + h11 * n[1] * n[1] + h22 * n[2] * n[2]
-            bend += 2 * (h01 * n[0] * n[1] + h02 * n[0] * n[2] + h12 * n[1] * n[2])
-            size = ti.sqrt(rise * rise + bend * bend)
-            if size > 0:
-                # Half-angle of t = atan2(rise, bend); rise is never negative.
-                cosine = ti.sqrt(ti.max(0.5 + 0.5 * bend / size, 0.0))
-                sine = ti.sqrt(ti.max(0.5 - 0.5 * bend / size, 0.0))
-                if bend > 0:
-                    sine = 0.5 * rise / (size * cosine)
-                turn = ti.Vector([cosine, sine * n[0], sine * n[1], sine * n[2]])
-                q = quaternion_product(q, turn).normalized()
-                if newton and 2 * sine < tolerance:
-                    left = 0
-            else:
+            real, imaginary = real / length, imaginary / length
+            turn = ti.Vector([real, imaginary * n[0], imaginary * n[1], imaginary * n[2]])
+            q = quaternion_product(q, turn).normalized()
+            if newton and 4 * imaginary * imaginary * square < tolerance * tolerance:
                 left = 0
         else:
             left = 0

@@ -42,6 +42,9 @@ def settle(
 def springs(step: Step, h: float) -> int:
     """Handles and contacts for the solution so far; how many contacts changed."""
     w, counts = step.w, step.counts
+    if not (counts.pulled or counts.colliders or counts.sprung):
+        return 0
+    counts.sprung = bool(counts.pulled or counts.colliders)
     holding.clear_springs(w, counts.nodes)
     holding.pull(w, counts.pulled, h)
     return contact.touch(w, counts.nodes, counts.colliders, h, step.dt) if counts.colliders else 0

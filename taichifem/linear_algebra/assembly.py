@@ -8,10 +8,8 @@ from taichifem.runtime import ti
 @ti.func
 def _warped(w: ti.template(), e: ti.i32, a: ti.i32, b: ti.i32):
     """Block of corners a and b of a linear or corotational element."""
-    h = w.h[e]
-    h_a = ti.Vector([h[a, k] for k in ti.static(range(w.d))])
-    h_b = ti.Vector([h[b, k] for k in ti.static(range(w.d))])
-    return hooke.stiffness_block(h_a, h_b, w.moduli[e][0], w.moduli[e][1])
+    first, moduli = e * w.corners, w.moduli[e]
+    return hooke.stiffness_block(w.h[first + a], w.h[first + b], moduli[0], moduli[1])
 
 
 @ti.kernel

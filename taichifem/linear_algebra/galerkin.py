@@ -3,9 +3,9 @@
 Z are the rigid motions of aggregates (see `multilevel`). Every block is gathered in a fixed order: no atomics.
 """
 
-from taichifem.linear_algebra.aggregates import Aggregates
-from taichifem.linear_algebra.levels import Levels
 from taichifem.runtime import ti
+from taichifem.structure.aggregates import Aggregates
+from taichifem.structure.levels import Levels
 from taichifem.world import DENSE, World
 
 
@@ -123,62 +123,73 @@ def _firm(w: ti.template(), M):
     return M
 
 
+@ti.func
+def _invert_own(w: ti.template(), n: ti.i32, g: ti.i32):
+    """The inverse of an aggregate's own matrix [[A, B], [B^T, D]], by Schur's complement of A."""
+    k = w.own_block[g]
+    width = w.row_start[n + 2 * g + 1] - w.row_start[n + 2 * g]
+    inverse = _firm(w, w.block[k]).inverse()
+    B = w.block[k + 1]
+    half = inverse @ B
+    rest = (_firm(w, w.block[k + width + 1]) - B.transpose() @ half).inverse()
+    across = half @ rest
+    w.own_inverse[4 * g] = inverse + across @ half.transpose()
+    w.own_inverse[4 * g + 1] = -across
+    w.own_inverse[4 * g + 2] = -across.transpose()
+    w.own_inverse[4 * g + 3] = rest
+
+
+@ti.func
+def _fill_last(w: ti.template(), n: ti.i32, first: ti.i32, end: ti.i32):
+    """Write the whole matrix of the last level, aggregates `first` to `end`, to `last_inverse`."""
+    size = 6 * (end - first)
+    for k in range(size * size):
+        w.last_inverse[k] = 0.0
+    for row in range(2 * (end - first)):
+        for k in range(w.row_start[n + 2 * first + row], w.row_start[n + 2 * first + row + 1]):
+            column = w.column[k] - n - 2 * first
+            for a in ti.static(range(3)):
+                for b in ti.static(range(3)):
+                    w.last_inverse[(3 * row + a) * size + 3 * column + b] = ti.cast(w.block[k][a, b], ti.f64)
+
+
+@ti.func
+def _invert_last(w: ti.template(), size: ti.i32):
+    """Invert `last_inverse` in its place, by Gauss and Jordan. A motion without stiffness but round-off is left out."""
+    tiny = ti.cast(ti.static({"f32": 1e-5, "f64": 1e-11}[w.precision]), ti.f64)
+    for k in range(size):
+        w.pivot[k] = w.last_inverse[k * size + k]
+    for k in range(size):
+        pivot = w.last_inverse[k * size + k]
+        if pivot > tiny * w.pivot[k]:
+            w.last_inverse[k * size + k] = 1.0
+            for j in range(size):
+                w.last_inverse[k * size + j] = w.last_inverse[k * size + j] / pivot
+            for i in range(size):
+                if i != k:
+                    factor = w.last_inverse[i * size + k]
+                    w.last_inverse[i * size + k] = 0.0
+                    for j in range(size):
+                        at = i * size + j
+                        w.last_inverse[at] = w.last_inverse[at] - factor * w.last_inverse[k * size + j]
+        else:
+            w.pivot[k] = -1.0
+    for k in range(size):
+        if w.pivot[k] < 0:
+            for j in range(size):
+                w.last_inverse[k * size + j] = 0.0
+                w.last_inverse[j * size + k] = 0.0
+
+
 @ti.kernel
-def _invert_own(w: ti.template(), n: ti.i32, aggregates: ti.i32):
-    """The inverse of each aggregate's own matrix [[A, B], [B^T, D]], by Schur's complement of A."""
+def _invert(w: ti.template(), n: ti.i32, aggregates: ti.i32, whole: ti.i32):
+    """The inverses of the aggregates' own matrices, and that of the last `whole` aggregates together."""
     for g in range(aggregates):
-        k = w.own_block[g]
-        width = w.row_start[n + 2 * g + 1] - w.row_start[n + 2 * g]
-        inverse = _firm(w, w.block[k]).inverse()
-        B = w.block[k + 1]
-        half = inverse @ B
-        schur = _firm(w, w.block[k + width + 1]) - B.transpose() @ half
-        rest = schur.inverse()
-        across = half @ rest
-        w.own_inverse[4 * g] = inverse + across @ half.transpose()
-        w.own_inverse[4 * g + 1] = -across
-        w.own_inverse[4 * g + 2] = -across.transpose()
-        w.own_inverse[4 * g + 3] = rest
-
-
-@ti.kernel
-def _invert_last(w: ti.template(), n: ti.i32, first: ti.i32, end: ti.i32):
-    """Invert the whole matrix of the last level, by Gauss and Jordan, in its place.
-
-    A motion without stiffness but for round-off is left out.
-    """
+        _invert_own(w, n, g)
     ti.loop_config(serialize=True)
-    for _ in range(1):
-        size = 6 * (end - first)
-        for k in range(size * size):
-            w.last_inverse[k] = 0.0
-        for row in range(2 * (end - first)):
-            for k in range(w.row_start[n + 2 * first + row], w.row_start[n + 2 * first + row + 1]):
-                column = w.column[k] - n - 2 * first
-                for a in ti.static(range(3)):
-                    for b in ti.static(range(3)):
-                        w.last_inverse[(3 * row + a) * size + 3 * column + b] = ti.cast(w.block[k][a, b], ti.f64)
-        for k in range(size):
-            w.pivot[k] = w.last_inverse[k * size + k]
-        for k in range(size):
-            pivot = w.last_inverse[k * size + k]
-            if pivot > ti.cast(ti.static({"f32": 1e-5, "f64": 1e-11}[w.precision]), ti.f64) * w.pivot[k]:
-                w.last_inverse[k * size + k] = 1.0
-                for j in range(size):
-                    w.last_inverse[k * size + j] /= pivot
-                for i in range(size):
-                    if i != k:
-                        factor = w.last_inverse[i * size + k]
-                        w.last_inverse[i * size + k] = 0.0
-                        for j in range(size):
-                            w.last_inverse[i * size + j] -= factor * w.last_inverse[k * size + j]
-            else:
-                w.pivot[k] = -1.0
-        for k in range(size):
-            if w.pivot[k] < 0:
-                for j in range(size):
-                    w.last_inverse[k * size + j] = 0.0
-                    w.last_inverse[j * size + k] = 0.0
+    for _ in range(ti.min(whole, 1)):
+        _fill_last(w, n, aggregates - whole, aggregates)
+        _invert_last(w, 6 * whole)
 
 
 class Galerkin:
@@ -188,10 +199,8 @@ class Galerkin:
         self._n, self._count = len(aggregates.order), aggregates.count
         self._first, self._pair = aggregates.first.tolist(), levels.first_pair.tolist()
 
-    @property
-    def solves_last(self) -> bool:
-        """Is the last level small enough to be inverted whole?"""
-        return 6 * (self._first[-1] - self._first[-2]) <= DENSE
+        last = self._first[-1] - self._first[-2]
+        self._whole = last if 6 * last <= DENSE else 0
 
     def renew(self, w: World) -> None:
         """All coarse matrices and inverses, from `w.block` of the nodes at `w.x`."""
@@ -199,6 +208,4 @@ class Galerkin:
         _gather_nodes(w, n, first[1], pair[1])
         for level in range(2, len(first)):
             _gather_level(w, n, level, first[level - 1], first[level], pair[level - 1], pair[level])
-        _invert_own(w, n, self._count)
-        if self.solves_last:
-            _invert_last(w, n, first[-2], first[-1])
+        _invert(w, n, self._count, self._whole)

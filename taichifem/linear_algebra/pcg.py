@@ -70,20 +70,19 @@ def solve(
     limits, rounds = Limits(tolerance, max_iterations), min(ROUNDS, MOST_TURNS // len(program))
     while True:
         crew.run(w, n, program, limits, rounds=rounds)
-        state = w.scalar.to_numpy()
-        if state[DONE] or not math.isfinite(state[RESIDUAL]):
+        if w.scalar[DONE] or not math.isfinite(w.scalar[RESIDUAL]):
             break
     if flying:
         balance.translate(w, flying, drag_factor)
         balance.spin(w, n, counts.pieces, flying, drag_factor)
-    residual = float(state[RESIDUAL])
+    residual = w.scalar[RESIDUAL]
     if not math.isfinite(residual):
         raise Diverged("the solver met a number that is not finite: take smaller time steps, or start more gently")
     return Convergence(
-        int(state[COUNT]),
+        int(w.scalar[COUNT]),
         residual,
         residual <= tolerance * (1 + 1e-12),
-        float(state[SIZE]),
-        float(state[NOISE]),
-        state[INDEFINITE] == 0,
+        w.scalar[SIZE],
+        w.scalar[NOISE],
+        w.scalar[INDEFINITE] == 0,
     )

@@ -7,8 +7,8 @@ from __future__ import annotations
 
 import numpy as np
 
-from taichifem.linear_algebra.aggregates import Aggregates
-from taichifem.linear_algebra.pattern import BlockPattern, pieces_of
+from taichifem.structure.aggregates import Aggregates
+from taichifem.structure.pattern import BlockPattern, pieces_of
 from taichifem.world import DENSE
 
 ADVANCE, LEAVE, RESTRICT, CORRECT, SMOOTH, LAST, PLAIN, DIRECT, PRODUCT = range(9)

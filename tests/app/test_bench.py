@@ -18,6 +18,7 @@ def figures(tets=160, median=1.0, **more):
     row = {"setup_s": 1.0, "first_step_s": 2.0, "tets": tets, "nodes": 81, "steps": 3, "ms": three}
     row |= {"phases_ms": {"solve": three}, "iterations": {"median": 5, "max": 6}, "residual": 1e-3, "capped_steps": 1}
     row |= {"real_time_factor": 16.7, "peak_mib": 200.0, "probe_ms": 5.0, "tips_m": [-0.1, -0.3, -0.2]}
+    row |= {"product": {"ms": 0.1, "gb_s": 8.0, "read_gb_s": 10.0}}
     return row | dict.fromkeys(("tip_m", "tip_lowest_m", "timoshenko_m"), -0.1) | more
 
 
@@ -37,6 +38,7 @@ def test_figures_of_a_small_bar(tmp_path):
     (row,) = content["rows"]
     assert (row["tets"], row["youngs"], row["steps"], row["cold_setup_s"]) == (160, 2e6, 3, None)
     assert (row["poisson"], row["solver"], row["model"]) == (0.3, "multilevel", "corotational")
+    assert row["product"]["gb_s"] > 0 and row["product"]["read_gb_s"] > 0
     assert row["timoshenko_m"] == pytest.approx(-bench_worker.timoshenko(2e6, 0.3))
     assert row["ms"]["p10"] <= row["ms"]["median"] <= row["ms"]["p90"]
     assert {"forces", "assembly", "solve"} <= set(row["phases_ms"])

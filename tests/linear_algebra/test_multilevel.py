@@ -132,3 +132,14 @@ def test_bodies_of_very_different_stiffness_on_the_ground():
         most = max(most, simulation.report.iterations / max(1, simulation.report.contact_passes))
     assert most <= 40
     assert np.isfinite(simulation.positions).all()
+
+
+def test_the_product_is_timed_and_leaves_no_trace():
+    simulations = [tf.Simulation(tf.Scene(bodies=[bar()])) for _ in range(2)]
+    for simulation in simulations:
+        simulation.step()
+    found = simulations[0].product_bandwidth()
+    assert 0 < found.achieved and 0 < found.limit
+    for simulation in simulations:
+        simulation.step()
+    assert np.array_equal(*(simulation.positions for simulation in simulations))

@@ -1,7 +1,7 @@
 import numpy as np
 import pytest
 
-from taichifem.linear_algebra.aggregates import SIZE, TOP, aggregate
+from taichifem.structure.aggregates import SIZE, TOP, aggregate
 
 
 @pytest.fixture

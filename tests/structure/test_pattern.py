@@ -3,9 +3,9 @@ import pytest
 import scipy.sparse
 
 from taichifem import TetMesh
-from taichifem.linear_algebra.aggregates import aggregate
-from taichifem.linear_algebra.levels import stack_levels
-from taichifem.linear_algebra.pattern import NODES, block_pattern, piece_starts, pieces_of
+from taichifem.structure.aggregates import aggregate
+from taichifem.structure.levels import stack_levels
+from taichifem.structure.pattern import NODES, block_pattern, piece_starts, pieces_of
 
 
 @pytest.fixture(scope="module")

@@ -1,10 +1,11 @@
-"""Which blocks of the stiffness matrix exist, and which elements add to each. NumPy only."""
+"""Which blocks of the stiffness matrix exist, and which elements add to each. NumPy and SciPy only."""
 
 from __future__ import annotations
 
 from dataclasses import dataclass
 
 import numpy as np
+import scipy.sparse
 
 PIECES = 32
 """Pieces that work on nodes or rows is cut into, at most."""
@@ -121,3 +122,15 @@ def block_pattern(cells: np.ndarray, n_nodes: int) -> BlockPattern:
         incident=(by_node // corners * 4 + by_node % corners).astype(narrow),
         pieces=pieces,
     )
+
+
+def to_sparse(pattern: BlockPattern, blocks: np.ndarray, order: np.ndarray) -> scipy.sparse.csr_matrix:
+    """The whole matrix (3n,3n) from its stored blocks (blocks,3,3), node i of the pattern being node order[i]."""
+    off = np.flatnonzero(pattern.lower != pattern.upper)
+    row, column, block = order[pattern.row], order[pattern.column[pattern.upper]], blocks[pattern.upper]
+    row, column = np.r_[row, column[off]], np.r_[column, row[off]]
+    block = np.concatenate([block, block[off].transpose(0, 2, 1)])
+    by_row = np.lexsort((column, row))
+    start = np.r_[0, np.cumsum(np.bincount(row))]
+    n = 3 * pattern.n_nodes
+    return scipy.sparse.bsr_matrix((block[by_row], column[by_row], start), shape=(n, n)).tocsr()

@@ -10,8 +10,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from taichifem.linear_algebra.aggregates import Aggregates
-from taichifem.linear_algebra.pattern import BlockPattern
+from taichifem.structure.aggregates import Aggregates
+from taichifem.structure.pattern import BlockPattern
 
 
 @dataclass(frozen=True)
