@@ -35,8 +35,9 @@ quicken()
 ARCHES = ("cpu", "cuda", "vulkan", "metal")
 PRECISIONS = {"f32": ti.f32, "f64": ti.f64}
 
-OPTIONS = {"make_cpu_multithreading_loop": False}
-"""Left on, Taichi deals loops out to threads in runs of 512 at least, however long one turn takes."""
+OPTIONS = {"make_cpu_multithreading_loop": False, "advanced_optimization": False}
+"""Left on, the first has Taichi deal loops out to threads in runs of 512 at least, however long one turn takes; the
+second triples the time of compilation, and LLVM optimises as well without it."""
 
 generation = 0
 """Counts the starts of Taichi: fields made under an earlier number are gone."""
