@@ -12,7 +12,7 @@ def _wrong(x):
 
 @ti.kernel
 def _calls_wrong():
-    for i in range(3):
+    for _ in range(3):
         _wrong(ti.Vector([1.0, 2.0]))
 
 

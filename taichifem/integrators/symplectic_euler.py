@@ -91,7 +91,7 @@ def advance(step: Step) -> StepReport:
         _load(w, n, dt, step.gravity)
         holding.hold(w, n, step.counts.held, dt, dt)
 
-    def solve(_: int) -> Convergence:
+    def solve(_: int, __: float) -> Convergence:
         with step.timer.phase("solve"):
             _solve(w, n)
         return Convergence(0, 0.0, True, 0.0, 0.0)

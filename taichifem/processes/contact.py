@@ -112,7 +112,7 @@ def press(w: ti.template(), n: ti.i32, n_colliders: ti.i32, h: ti.f64, dt: ti.f6
     for i in range(n):
         step, whole = ti.cast(h, w.real), ti.cast(dt, w.real)
         for c in range(n_colliders):
-            _, force, _, _ = _state(w, c, i, step, whole, w.v[i] + w.dv[i])
+            force = _state(w, c, i, step, whole, w.v[i] + w.dv[i])[1]
             share = ti.cast(FRICTION_TOLERANCE, w.real)
             if ti.abs(force - w.pressed[c, i]) > share * (force + w.mass[i] * ti.cast(weight, w.real)):
                 changed += 1
