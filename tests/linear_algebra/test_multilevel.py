@@ -57,15 +57,15 @@ def test_block_jacobi_gives_the_same_answer_in_more_iterations():
     assert iterations[1] > 4 * iterations[0]
 
 
-def test_an_operation_a_launch_gives_the_same_bits(monkeypatch):
-    """The way that other devices than the CPU go."""
+def test_an_operation_a_launch_gives_the_same_answer(monkeypatch):
+    """The way that other devices than the CPU go. (Compiled apart, sums may be rounded otherwise.)"""
     ends = []
     for arch in ("cpu", "any other"):
         monkeypatch.setattr(crew.runtime, "running_arch", lambda arch=arch: arch)
         simulation = tf.Simulation(tf.Scene(bodies=[bar(), bar(1e4, pins=(), position=(0, 1, 0))]))
         simulation.advance(seconds=0.05)
-        ends.append(simulation.positions)
-    assert np.array_equal(*ends)
+        ends.append((simulation.positions, simulation.report.iterations))
+    assert ends[0][0] == pytest.approx(ends[1][0], abs=1e-5) and ends[0][1] == ends[1][1]
 
 
 def coarse_matrix(simulation):
