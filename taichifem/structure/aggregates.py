@@ -6,10 +6,10 @@ from dataclasses import dataclass
 
 import numpy as np
 
-SIZE = 20
+SIZE = 24
 """Nodes of an aggregate of the first level, about."""
 
-BRANCHES = 8
+BRANCHES = 5
 """Aggregates of a level that make one of the next, about."""
 
 TOP = 12
