@@ -114,8 +114,9 @@ def test_a_signal_ends_the_run_after_the_frame_in_work(tmp_path, outputs, number
 def test_a_second_ctrl_c_ends_the_run_at_once(tmp_path, outputs):
     def interrupt_twice(simulation, image):
         os.kill(os.getpid(), signal.SIGINT)
-        time.sleep(0.05)  # two at the same instant would count as one
+        time.sleep(0.2)  # two at the same instant would count as one
         os.kill(os.getpid(), signal.SIGINT)
+        time.sleep(5)  # a signal may take a moment
         raise AssertionError("still here")
 
     summary = run_recording(StubSimulation(), frames=9, on_frame=interrupt_twice, **outputs)
