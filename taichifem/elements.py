@@ -125,6 +125,13 @@ def with_first(rows):
     )
 
 
+@ti.func
+def hand_out(rows, corners: ti.template(), w: ti.template(), e: ti.i32):
+    """Write the rows (d+1,d) of a quantity of the corners to a field that holds it corner by corner."""
+    for a in ti.static(range(w.corners)):
+        corners[e * w.corners + a] = ti.Vector([rows[a, k] for k in ti.static(range(w.d))])
+
+
 @ti.kernel
 def deform(
     w: ti.template(),
@@ -155,10 +162,8 @@ def deform(
         strain = _strain(F, R, w, e) + (ti.cast(rate_factor, w.real) + ti.cast(rate_damping, w.real) * damping) * rate
         stress = R @ hooke.stress(strain, row[LAMBDA], row[MU])
         volume = w.volume[e]
-        h = with_first(gradients @ R.transpose())
-        for a in ti.static(range(w.corners)):
-            w.h[e * w.corners + a] = ti.Vector([h[a, k] for k in ti.static(range(w.d))])
-        w.corner_force[e] = with_first(-volume * (gradients @ stress.transpose()))
+        hand_out(with_first(gradients @ R.transpose()), w.h, w, e)
+        hand_out(with_first(-volume * (gradients @ stress.transpose())), w.corner_force, w, e)
         factor = ti.cast(stiffness_factor, w.real) + ti.cast(damping_factor, w.real) * damping
         w.moduli[e] = volume * factor * ti.Vector([row[LAMBDA], row[MU]])
 
@@ -169,8 +174,7 @@ def gathered_force(w: ti.template(), i: ti.i32):
     total = ti.Vector.zero(w.real, w.d)
     for k in range(w.incident_start[i], w.incident_start[i + 1]):
         e, a = w.incident[k] >> 2, w.incident[k] & 3
-        f = w.corner_force[e]
-        total += ti.Vector([f[a, k] for k in ti.static(range(w.d))])
+        total += w.corner_force[e * w.corners + a]
     return lifted(total, w)
 
 

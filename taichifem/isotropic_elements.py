@@ -36,7 +36,8 @@ def push(w: ti.template(), law: ti.template(), number: ti.i32, n_elements: ti.i3
         if row[elements.MODEL] == number:
             slope = law.slope(w.stretch[e], row[elements.LAMBDA], row[elements.MU])
             P = isotropic.first_piola(w.svd_u[e], slope, w.svd_v[e])
-            w.corner_force[e] = elements.with_first(-w.volume[e] * (w.gradients[e] @ P.transpose()))
+            forces = elements.with_first(-w.volume[e] * (w.gradients[e] @ P.transpose()))
+            elements.hand_out(forces, w.corner_force, w, e)
 
 
 @ti.kernel
@@ -69,7 +70,8 @@ def respond(
             share = ti.cast(rate_factor, w.real) + ti.cast(rate_damping, w.real) * beta
             P = isotropic.first_piola(U, law.slope(s, la, mu), V)
             P += share * isotropic.stress_change(rate, U, V, damping_a, damping_p, damping_q)
-            w.corner_force[e] = elements.with_first(-w.volume[e] * (w.gradients[e] @ P.transpose()))
+            forces = elements.with_first(-w.volume[e] * (w.gradients[e] @ P.transpose()))
+            elements.hand_out(forces, w.corner_force, w, e)
             own, extra = ti.cast(stiffness_factor, w.real), ti.cast(damping_factor, w.real) * beta
             w.tangent_a[e] = own * A + extra * damping_a
             w.tangent_p[e] = own * p + extra * damping_p

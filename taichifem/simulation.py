@@ -294,7 +294,8 @@ class Simulation(Bodies):
             arrays = {
                 "x": transfer.read(w, w.x, n),
                 "v": transfer.read(w, w.v, n),
-                "dv": transfer.read(w, w.dv, n),
+                "v0": transfer.read(w, w.v0, n),
+                "past": transfer.read(w, w.past, n),
                 "rotation": transfer.read(w, w.rotation, m),
                 "plastic": transfer.read(w, w.plastic, m),
                 **transfer.read_contacts(w, self._counts.colliders, n),
@@ -316,7 +317,7 @@ class Simulation(Bodies):
             raise InputError(f"{path}: the checkpoint belongs to another scene, time step or precision")
         w = self._world
         with self._kernels():
-            for name in ("x", "v", "dv", "rotation", "plastic", *(PAST if self._integrator_remembers else ())):
+            for name in ("x", "v", "v0", "past", "rotation", "plastic", *(PAST if self._integrator_remembers else ())):
                 transfer.write(w, getattr(w, name), arrays[name])
             transfer.write_contacts(w, arrays)
         self._clock, self._fresh = clock, bool(header["fresh"])

@@ -74,7 +74,7 @@ def stretch(
                     w.tangent[e * w.corner_pairs + corner_pair(w, a, a)] += block
                     w.tangent[e * w.corner_pairs + corner_pair(w, b, b)] += block
                     w.tangent[e * w.corner_pairs + corner_pair(w, a, b)] -= block
-            w.corner_force[e] = force
+            elements.hand_out(force, w.corner_force, w, e)
 
 
 @ti.kernel

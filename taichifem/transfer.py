@@ -7,7 +7,7 @@ from taichifem.runtime import PRECISIONS, ti
 from taichifem.structure.aggregates import Aggregates
 from taichifem.structure.levels import Levels
 from taichifem.structure.pattern import BlockPattern
-from taichifem.world import World
+from taichifem.world import MEMORY, World
 
 _array = ti.types.ndarray
 
@@ -19,7 +19,9 @@ def _fill_nodes(w: ti.template(), rest: _array(), v: _array(), incident_start: _
             w.rest[i][k] = rest[i, k]
             w.x[i][k] = rest[i, k]
             w.v[i][k] = v[i, k]
+            w.v0[i][k] = v[i, k]
         w.dv[i] = ti.Vector.zero(w.real, 3)
+        w.past[i] = ti.Matrix.zero(w.real, 3, MEMORY + 1)
         w.outside[i] = ti.Vector.zero(w.real, 3)
         for c in range(w.touching.shape[0]):
             w.touching[c, i] = 0
@@ -167,6 +169,14 @@ def _write(target: ti.template(), source: _array(), n: ti.i32):
 
 
 @ti.kernel
+def _write_matrix(target: ti.template(), source: _array(), n: ti.i32):
+    for i in range(n):
+        for a in ti.static(range(target.n)):
+            for b in ti.static(range(target.m)):
+                target[i][a, b] = source[i, a, b]
+
+
+@ti.kernel
 def _read(source: ti.template(), target: _array(), n: ti.i32):
     for i in range(n):
         for k in ti.static(range(source.n)):
@@ -276,8 +286,9 @@ def read(w: World, field, n: int) -> np.ndarray:
 
 
 def write(w: World, field, array: np.ndarray) -> None:
-    """Set the first entries of a vector field from (n,k)."""
-    _write(field, _real(w, array), len(array))
+    """Set the first entries of a vector field from (n,k), or of a matrix field from (n,k,l)."""
+    write_entries = _write if array.ndim == 2 else _write_matrix
+    write_entries(field, _real(w, array), len(array))
 
 
 def read_contacts(w: World, n_colliders: int, n: int) -> dict[str, np.ndarray]:

@@ -24,6 +24,9 @@ DENSE = 96
 SIDES = 8
 """Shares of an operation that threads begin with: one for each, up to this many."""
 
+MEMORY = 3
+"""Steps that a solve's start is guessed from."""
+
 MOST_TURNS = 4096
 """Operations of a solve in one launch at most."""
 
@@ -142,7 +145,7 @@ class World:
         self.material, self.body = self._scalar(m, ti.i32), self._scalar(m, ti.i32)
         self.gradients, self.volume = self._matrix(m, d, d), self._scalar(m)
         self.rotation, self.plastic = self._vector(m, 4), self._vector(m, 6)
-        self.h, self.corner_force = self._vector(corners * m, d), self._matrix(m, corners, d)
+        self.h, self.corner_force = (self._vector(corners * m, d) for _ in range(2))
         self.moduli = self._vector(m, 2)  # lambda and mu, times the step's factor of K
         self.stress = self._matrix(m, 3, 3)
         self.energy = self._scalar(m)
@@ -175,6 +178,10 @@ class World:
         self.spring_load = self._vector(c.nodes, 3)
         self.sprung = self._scalar(c.nodes, ti.i32)  # 1 where a spring acts
         self.inverse = self._matrix(c.nodes, 3, 3)
+        # What the last steps added to the velocities (`linear_algebra.guess`): column 0 is for what is held.
+        self.past, self.image = (self._matrix(c.nodes, 3, MEMORY + 1) for _ in range(2))
+        self.gram, self.share = ti.field(ti.f64), self._scalar(MEMORY + 1, ti.f64)
+        self._builder.dense(ti.ijk, (PIECES + 1, MEMORY, MEMORY + 1)).place(self.gram)
         self.direction, self.product = self._vector(c.nodes, 3), self._vector(c.nodes, 3)
         # Right-hand side, solution and work space of every level; that of the nodes is the residual.
         self.residual, self.z, self.left = (self._vector(rows, 3) for _ in range(3))

@@ -21,7 +21,7 @@ import numpy as np
 from taichifem import elements
 from taichifem.integrators.constraints import friction, settle, springs
 from taichifem.integrators.step import Iteration, Step, StepReport
-from taichifem.linear_algebra import assembly, pcg
+from taichifem.linear_algebra import assembly, guess, pcg
 from taichifem.processes import holding
 from taichifem.runtime import ti
 
@@ -44,6 +44,8 @@ ALWAYS = 1e30
 def start(w: ti.template(), n: ti.i32):
     """Remember where the step begins, and go on from there: the base of backward Euler."""
     for i in range(n):
+        guess.remember(w, i)
+        w.dv[i] = guess.recall(w, i)
         w.x0[i] = w.x[i]
         w.v0[i] = w.v[i]
         w.base_x[i] = w.x[i]
@@ -60,8 +62,9 @@ def go_back(w: ti.template(), n: ti.i32):
 
 
 @ti.kernel
-def _load(w: ti.template(), n: ti.i32, h: ti.f64, inertia: ti.f64, gravity: ti.types.vector(3, ti.f64)):
+def _load(w: ti.template(), n: ti.i32, h: ti.f64, inertia: ti.f64, gx: ti.f64, gy: ti.f64, gz: ti.f64):
     """Right-hand side of the step without contact and handles."""
+    gravity = ti.Vector([gx, gy, gz])
     for i in range(n):
         step, share = ti.cast(h, w.real), ti.cast(inertia, w.real)
         w.force[i] = elements.gathered_force(w, i)
@@ -115,7 +118,7 @@ def _at_work(w: ti.template(), n: ti.i32, h: ti.f64) -> ti.f64:
 def solve(step: Step, *, h: float, newton: int, inertia: bool = True) -> StepReport:
     """Find the end of the step: `w.x` and `w.v`, from `w.x0`, `w.v`, `w.base_x` and `w.base_v`.
 
-    `w.dv` starts from the last step's, which is close when motion is smooth.
+    `w.dv` starts from what the last steps did, which is close when motion is smooth.
     newton: most linearisations; 1 is the linearly implicit method.
     """
     w, n = step.w, step.counts.nodes
@@ -124,7 +127,7 @@ def solve(step: Step, *, h: float, newton: int, inertia: bool = True) -> StepRep
     noise = float(np.finfo(np.float32 if w.precision == "f32" else np.float64).eps) / h
     report, first = StepReport(balanced=newton == 1), 0.0
 
-    def solve_linear(_: int, slack: float) -> pcg.Convergence:
+    def solve_linear(passes: int, slack: float) -> pcg.Convergence:
         with step.timer.phase("solve"):
             return pcg.solve(
                 w,
@@ -136,6 +139,7 @@ def solve(step: Step, *, h: float, newton: int, inertia: bool = True) -> StepRep
                 noise=noise,
                 weight=weight,
                 drag_factor=h * inertia,
+                guessed=inertia and passes == 1 and report.linearisations == 0,
             )
 
     def solve_step() -> pcg.Convergence:
@@ -187,7 +191,7 @@ def _linearise(step: Step, h: float, inertia: bool, *, first: bool = False, exac
             projected=not exact,
             keep=True,
         )
-        _load(w, n, h, damped, step.gravity)
+        _load(w, n, h, damped, *step.gravity)
         if not first:
             _forget(w, n)
         holding.hold(w, n, step.counts.held, step.dt, h)

@@ -11,8 +11,9 @@ from taichifem.runtime import ti
 
 
 @ti.kernel
-def _accelerate(w: ti.template(), n: ti.i32, gravity: ti.types.vector(3, ti.f64)):
+def _accelerate(w: ti.template(), n: ti.i32, gx: ti.f64, gy: ti.f64, gz: ti.f64):
     """Acceleration at the start, kept in `w.past_v` [m/s^2]."""
+    gravity = ti.Vector([gx, gy, gz])
     for i in range(n):
         force = elements.gathered_force(w, i) + w.outside[i] - w.drag[i] * w.v[i]
         w.past_v[i] = force / w.mass[i] + ti.cast(gravity, w.real)
@@ -41,7 +42,7 @@ def advance(step: Step) -> StepReport:
         if step.follow is not None:
             step.follow()
         step.laws.deform(w, step.counts, stiffness=0.0, rate_damping=1.0, keep=True)
-        _accelerate(w, n, step.gravity)
+        _accelerate(w, n, *step.gravity)
     _half_way(w, n, h)
     report = implicit.solve(step, h=h, newton=step.options.newton)
     _remember(w, n, h)

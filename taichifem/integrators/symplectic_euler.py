@@ -24,8 +24,9 @@ LOST = 0
 
 
 @ti.kernel
-def _load(w: ti.template(), n: ti.i32, dt: ti.f64, gravity: ti.types.vector(3, ti.f64)):
+def _load(w: ti.template(), n: ti.i32, dt: ti.f64, gx: ti.f64, gy: ti.f64, gz: ti.f64):
     """Impulses on the nodes, without contact and handles."""
+    gravity = ti.Vector([gx, gy, gz])
     for i in range(n):
         w.force[i] = elements.gathered_force(w, i)
         outside = w.mass[i] * ti.cast(gravity, w.real) + w.outside[i] - w.drag[i] * w.v[i]
@@ -88,7 +89,7 @@ def advance(step: Step) -> StepReport:
         if step.follow is not None:
             step.follow()
         step.laws.push(w, step.counts, damped=step.damped)
-        _load(w, n, dt, step.gravity)
+        _load(w, n, dt, *step.gravity)
         holding.hold(w, n, step.counts.held, dt, dt)
 
     def solve(_: int, __: float) -> Convergence:

@@ -7,9 +7,9 @@ from taichifem.runtime import ti
 def multiply(w: ti.template(), source: ti.template(), target: ti.template(), begin: ti.i32, end: ti.i32):
     """The rows `begin` to `end` of A times `source`, to `target`; rows of nodes must be a piece of `BlockPattern`."""
     for i in range(begin, end):
-        target[i] = ti.Vector.zero(w.real, 3)
+        target[i] = ti.zero(source[i])
     for i in range(begin, end):
-        own, total = source[i], ti.Vector.zero(w.real, 3)
+        own, total = source[i], ti.zero(source[i])
         for k in range(w.row_start[i], w.near[i]):
             total += w.block[k] @ source[w.column[k]]
         for k in range(w.near[i], w.row_start[i + 1]):

@@ -18,6 +18,7 @@ import numpy as np
 from taichifem.errors import Diverged
 from taichifem.linear_algebra import balance, crew, steps
 from taichifem.linear_algebra.galerkin import Galerkin
+from taichifem.linear_algebra.guess import guess
 from taichifem.linear_algebra.steps import COUNT, DONE, INDEFINITE, NOISE, RESIDUAL, SIZE, Limits
 from taichifem.world import MOST_TURNS, Counts, World
 
@@ -52,6 +53,7 @@ def solve(
     noise: float,
     weight: float,
     drag_factor: float,
+    guessed: bool = False,
 ) -> Convergence:
     """Improve `w.dv` until the residual is below `tolerance` times what acts on the nodes.
 
@@ -59,10 +61,15 @@ def solve(
     w: world with own, block, spring, load, spring_load, free and the start dv.
     noise: relative rounding error of the forces, over dt.  weight: gravity times dt [m/s].
     drag_factor: of `w.drag` in the matrix.
+    guessed: start from what the last steps did (`guess`), not from `w.dv`.
     Raises Diverged where the residual is not finite.
     """
     n, flying = counts.nodes, counts.bodies if counts.flying else 0
-    steps.begin(w, n, counts.pieces, noise, weight)
+    steps.prepare(w, n, counts.pieces, noise, weight)
+    if guessed:
+        guess(w, n, counts.pieces)
+    else:
+        steps.begin(w, n, counts.pieces)
     if flying:
         balance.translate(w, flying, drag_factor)
     if galerkin is not None:

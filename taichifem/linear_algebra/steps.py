@@ -58,8 +58,8 @@ def range_of(items: ti.i32, c: ti.i32, pieces: ti.i32):
 
 
 @ti.kernel
-def begin(w: ti.template(), n: ti.i32, pieces: ti.i32, noise: ti.f64, weight: ti.f64):
-    """Diagonal, residual and first direction; the size of load and weight (`weight` is gravity times dt).
+def prepare(w: ti.template(), n: ti.i32, pieces: ti.i32, noise: ti.f64, weight: ti.f64):
+    """The matrix's diagonal; the size of load and weight (`weight` is gravity times dt).
 
     `noise` times the diagonal's size is what rounding leaves of the forces: a right-hand side below that
     is not worth resolving further.
@@ -72,16 +72,11 @@ def begin(w: ti.template(), n: ti.i32, pieces: ti.i32, noise: ti.f64, weight: ti
             d = w.own[i] + w.spring[i]
             w.block[w.diagonal[i]] = d
             w.inverse[i] = _inverse_diagonal(w, i, d)
-            w.direction[i] = ti.Vector.zero(w.real, 3)
             stiff = (d.trace() - 3 * w.mass[i]) * w.free[i].sum() / 9
             floor = ti.cast(noise, ti.f64) * ti.cast(stiff * w.x[i].norm(), ti.f64)
             sums[0] += _impulse(w, i) * (1 - w.sprung[i])
             sums[1] += floor**2
             sums[2] += ti.cast(w.mass[i] * w.mass[i] * w.free[i].sum() / 3, ti.f64)
-        matrix.multiply(w, w.dv, w.product, first, last)
-        for i in range(first, last):
-            w.residual[i] = w.free[i] * (w.load[i] + w.spring_load[i] - w.product[i])
-            w.product[i] = ti.Vector.zero(w.real, 3)
         w.partial[c] = sums
     ti.loop_config(serialize=True)
     for _ in range(1):
@@ -94,6 +89,25 @@ def begin(w: ti.template(), n: ti.i32, pieces: ti.i32, noise: ti.f64, weight: ti
         w.scalar[DONE] = 0.0
         w.scalar[COUNT] = -1.0
         w.scalar[INDEFINITE] = 0.0
+
+
+@ti.func
+def leave(w: ti.template(), i: ti.i32, product):
+    """The residual of node i, given its row of A dv; and no direction yet."""
+    w.residual[i] = w.free[i] * (w.load[i] + w.spring_load[i] - product)
+    w.product[i] = ti.Vector.zero(w.real, 3)
+    w.direction[i] = ti.Vector.zero(w.real, 3)
+
+
+@ti.kernel
+def begin(w: ti.template(), n: ti.i32, pieces: ti.i32):
+    """Start from `w.dv`."""
+    ti.loop_config(block_dim=1)
+    for c in range(pieces):
+        first, last = range_of(n, c, pieces)
+        matrix.multiply(w, w.dv, w.product, first, last)
+        for i in range(first, last):
+            leave(w, i, w.product[i])
 
 
 @ti.func
