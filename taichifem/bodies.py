@@ -2,12 +2,15 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import scipy.sparse
 
 from taichifem import elements, runtime, transfer
 from taichifem.description import Collider, Material, Scene
 from taichifem.description.check import whole
+from taichifem.description.material import ELASTIC
 from taichifem.errors import InputError
 from taichifem.integrators import EXACT, symplectic_euler
 from taichifem.laws import Laws
@@ -59,6 +62,7 @@ class Bodies:
             transfer.fill_levels(self._world, self._pattern, self._levels, self._layout.aggregates, self._program)
         self._surroundings = Surroundings(scene, self._layout, self._world, self._counts)
         self._gravity = np.asarray(scene.gravity, dtype=float)
+        self._due = 0.0  # time over which plastic flow is due: it is made up for when the next step begins [s]
 
     def _capacity(self) -> Capacity:
         layout, pattern = self._layout, self._pattern
@@ -81,6 +85,7 @@ class Bodies:
             dimension=layout.dimension,
             tangents=self._laws.stores_tangents,
             springs=self._laws.springs,
+            plastic=self._laws.plastic,
         )
 
     def _kernels(self):
@@ -92,20 +97,7 @@ class Bodies:
     # Materials and surroundings
 
     def _fill_table(self) -> None:
-        rows = np.array(
-            [
-                [
-                    m.lame_lambda,
-                    m.shear_modulus,
-                    m.mass_damping,
-                    m.stiffness_damping,
-                    m.density,
-                    float(self._laws.number(m)),
-                    m.spring_stiffness or 0.0,
-                ]
-                for m in self._materials
-            ]
-        )
+        rows = np.array([self._laws.row(m) for m in self._materials])
         turning = np.zeros(len(self.scene.bodies), dtype=bool)
         for (body, _), row in self._layout.material_of.items():
             turning[body] |= self._materials[row].model != "linear"
@@ -132,7 +124,8 @@ class Bodies:
 
     def _change_material(self, row: int, material: Material) -> None:
         if not self._laws.knows(material):
-            raise InputError(f"the scene has no {material.model!r} material yet: make a new simulation for that")
+            kind = "plastic" if self._laws.knows(replace(material, **ELASTIC)) else repr(material.model)
+            raise InputError(f"the scene has no {kind} material yet: make a new simulation for that")
         self._materials[row] = material
         self._fill_table()
 
@@ -232,7 +225,9 @@ class Bodies:
         if not np.isfinite(array).all():
             raise InputError(f"{name} hold NaN or infinity at node {np.argwhere(~np.isfinite(array))[0, 0]}")
         with self._kernels():
+            self._laws.settle(self._world, self._counts, due=self._due)
             transfer.write(self._world, field, array[self._layout.node_order])
+        self._due = 0.0
         self._changed()
 
     def _changed(self) -> None:
@@ -243,7 +238,7 @@ class Bodies:
     def elastic_forces(self) -> np.ndarray:
         """Elastic forces on the nodes (n,3) [N] at the current positions, without damping."""
         with self._kernels():
-            self._laws.deform(self._world, self._counts, stiffness=1.0)
+            self._laws.deform(self._world, self._counts, stiffness=1.0, due=self._due)
             elements.gather_forces(self._world, self._counts.nodes)
         return self._read(self._world.force)
 
@@ -257,7 +252,7 @@ class Bodies:
         """
         pattern = self._pattern
         with self._kernels():
-            self._laws.deform(self._world, self._counts, stiffness=1.0, projected=projected)
+            self._laws.deform(self._world, self._counts, stiffness=1.0, due=self._due, projected=projected)
             assembly.assemble(self._world, self._counts.pairs, 0.0, 0.0)
             blocks = transfer.read(self._world, self._world.block, pattern.n_blocks).astype(np.float64)
         return to_sparse(pattern, blocks, self._layout.node_order)
@@ -269,7 +264,7 @@ class Bodies:
 
     def _measure(self) -> None:
         with self._kernels():
-            self._laws.measure(self._world, self._counts)
+            self._laws.measure(self._world, self._counts, due=self._due)
 
     def cauchy_stress(self) -> np.ndarray:
         """Cauchy stress of each element (m,3,3) [Pa]."""
@@ -281,6 +276,22 @@ class Bodies:
         stress = self.cauchy_stress()
         deviator = stress - np.trace(stress, axis1=1, axis2=2)[:, None, None] * np.eye(3) / 3
         return np.sqrt(1.5 * (deviator**2).sum(axis=(1, 2)))
+
+    def plastic_strain(self) -> np.ndarray:
+        """Plastic strain of each element (m,3,3), in its rotated frame."""
+        return self._plastic()[0]
+
+    def equivalent_plastic_strain(self) -> np.ndarray:
+        """Accumulated plastic strain of each element (m,), measured as in uniaxial tension."""
+        return self._plastic()[1]
+
+    def _plastic(self) -> tuple[np.ndarray, np.ndarray]:
+        if not self._laws.plastic:
+            m = self._counts.elements
+            return np.zeros((m, 3, 3)), np.zeros(m)
+        with self._kernels():
+            self._laws.show_plastic(self._world, self._counts, due=self._due)
+        return self._read(self._world.stress), self._read(self._world.energy)
 
     def elastic_energy(self) -> float:
         """Elastic energy of everything [J]."""

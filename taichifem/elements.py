@@ -3,15 +3,19 @@
 The same code serves tetrahedra (d = 3) and triangles (d = 2: plane strain in the plane y = 0).
 """
 
+from taichifem import plastic_strain
 from taichifem.formulas import hooke, rotation
 from taichifem.runtime import ti
 
-LAMBDA, MU, MASS_DAMPING, STIFFNESS_DAMPING, DENSITY, MODEL, SPRING = range(7)
-"""Columns of the material table. SPRING: stiffness [N/m] given for the springs along edges, or 0."""
+LAMBDA, MU, MASS_DAMPING, STIFFNESS_DAMPING, DENSITY, MODEL, SPRING, PLASTICITY, LIMIT, SLOPE, RATE, PRESSED = range(12)
+"""Columns of the material table. SPRING: stiffness [N/m] given for the springs along edges, or 0. From PLASTICITY on:
+the kind of law (`formulas.plasticity`) and its yield stress, hardening and viscosity, or for creep yield strain,
+most plastic strain and rate; PRESSED: the limit of springs under pressure."""
 
-LINEAR, COROTATIONAL, QUICK, SPRINGS, FIRST_LAW = range(5)
+LINEAR, COROTATIONAL, QUICK, SPRINGS, YIELDING_LINEAR, YIELDING, FIRST_LAW = range(7)
 """What MODEL may be: up to QUICK (corotational by QR) they have the fast road below; SPRINGS are in
-`spring_elements`; from FIRST_LAW on come the isotropic laws of the scene."""
+`spring_elements`; the plastic ones that Newton's method wants exact tangents of, in `yielding_elements`; from FIRST_LAW
+on come the isotropic laws of the scene."""
 
 AXES = {2: (0, 2), 3: (0, 1, 2)}
 """Coordinates of the nodes that elements of dimension d see."""
@@ -43,6 +47,12 @@ def lifted_matrix(m, w: ti.template()):
 
 
 @ti.func
+def seen_matrix(m, w: ti.template()):
+    """Of a (3,3) matrix, what an element sees (d,d)."""
+    return ti.Matrix([[m[i, j] for j in ti.static(AXES[w.d])] for i in ti.static(AXES[w.d])])
+
+
+@ti.func
 def edges(field: ti.template(), w: ti.template(), e: ti.i32):
     """Differences of a node field to the element's first node, as columns (d,d)."""
     cell = w.cell[e]
@@ -51,24 +61,36 @@ def edges(field: ti.template(), w: ti.template(), e: ti.i32):
 
 
 @ti.func
-def _symmetric(m):
+def symmetric(m):
     return 0.5 * (m + m.transpose())
 
 
 @ti.func
-def _plastic(w: ti.template(), e: ti.i32):
-    """Plastic strain as a matrix (d,d)."""
-    p = w.plastic[e]
-    place = ti.static(((0, 3, 5), (3, 1, 4), (5, 4, 2)))
-    return ti.Matrix([[p[place[i][j]] for j in ti.static(AXES[w.d])] for i in ti.static(AXES[w.d])])
+def plastic_law(row):
+    """The last columns of a row of the material table."""
+    return ti.Vector([row[PLASTICITY + k] for k in ti.static(range(4))])
 
 
 @ti.func
-def _strain(F, R, w: ti.template(), e: ti.i32):
-    """Elastic strain in the rotated frame: sym(R^T F) - I - eps_p."""
-    strain = _symmetric(R.transpose() @ F) - _plastic(w, e)
+def elastic_strain(F, R, w: ti.template(), e: ti.i32, row, dt, keep: ti.i32):
+    """Elastic strain in the rotated frame (3,3): sym(R^T F) - I - eps_p, after plastic flow over dt [s], if any.
+
+    keep: what has flowed stays.
+    """
+    small = symmetric(R.transpose() @ F)
     for k in ti.static(range(w.d)):
-        strain[k, k] -= 1
+        small[k, k] -= 1
+    strain = lifted_matrix(small, w)
+    # Not one condition: where no field for it is there, the second must not be compiled.
+    if ti.static(w.capacity.plastic):  # noqa: SIM102
+        if row[PLASTICITY] > 0:
+            strain -= plastic_strain.kept(w, e)
+            if dt > 0:
+                law = plastic_law(row)
+                moved, growth = plastic_strain.flowed(w, e, strain, row[MU], law, ti.cast(dt, w.real))
+                strain -= moved
+                if keep and growth > 0:
+                    plastic_strain.add(w, e, moved, growth)
     return strain
 
 
@@ -79,7 +101,7 @@ def rotation_of(w: ti.template(), e: ti.i32, F, most: ti.i32, keep: ti.i32):
     model = w.table[w.material[e]][MODEL]
     if model == QUICK:
         R = rotation.orthonormal(F)
-    elif model > LINEAR:
+    elif model > LINEAR and model != YIELDING_LINEAR:
         if ti.static(w.d == 2):
             R = rotation.nearest_rotation_2d(F)
         else:
@@ -140,6 +162,7 @@ def deform(
     damping_factor: ti.f64,
     rate_factor: ti.f64,
     rate_damping: ti.f64,
+    due: ti.f64,
     most: ti.i32,
     keep: ti.i32,
 ):
@@ -148,7 +171,8 @@ def deform(
     Corner forces are -V R (sigma + sigma_rate) g_a, where the rate stress is that of the strain rate times
     (rate_factor + rate_damping beta): the part of dt K v that linearisation brings, and the damping.
     `w.moduli` becomes V (stiffness_factor + damping_factor beta) (lambda, mu), with beta the material's stiffness
-    damping.  most: iterations for a rotation.  keep: the rotations found start the next search; 0 leaves no trace.
+    damping.  due: time of plastic flow that the last step has left [s].  most: iterations for a rotation.
+    keep: the rotations found start the next search, and what has flowed stays; 0 leaves no trace.
     """
     for e in range(n_elements):
         row = w.table[w.material[e]]
@@ -157,10 +181,11 @@ def deform(
         gradients = w.gradients[e]
         F = edges(w.x, w, e) @ gradients
         R = rotation_of(w, e, F, most, keep)
-        rate = _symmetric(R.transpose() @ (edges(w.v, w, e) @ gradients))
+        rate = symmetric(R.transpose() @ (edges(w.v, w, e) @ gradients))
         damping = row[STIFFNESS_DAMPING]
-        strain = _strain(F, R, w, e) + (ti.cast(rate_factor, w.real) + ti.cast(rate_damping, w.real) * damping) * rate
-        stress = R @ hooke.stress(strain, row[LAMBDA], row[MU])
+        share = ti.cast(rate_factor, w.real) + ti.cast(rate_damping, w.real) * damping
+        strain = elastic_strain(F, R, w, e, row, due, keep) + share * lifted_matrix(rate, w)
+        stress = R @ seen_matrix(hooke.stress(strain, row[LAMBDA], row[MU]), w)
         volume = w.volume[e]
         hand_out(with_first(gradients @ R.transpose()), w.h, w, e)
         hand_out(with_first(-volume * (gradients @ stress.transpose())), w.corner_force, w, e)
@@ -186,25 +211,26 @@ def gather_forces(w: ti.template(), n: ti.i32):
 
 
 @ti.kernel
-def measure(w: ti.template(), n_elements: ti.i32, most: ti.i32):
+def measure(w: ti.template(), n_elements: ti.i32, due: ti.f64, most: ti.i32):
     """Cauchy stress `w.stress` [Pa] and elastic energy `w.energy` [J] of every element at `w.x`.
 
     Corotational: P F^T / det F; where an element is flat or inside out that has no meaning, and the
     rotated stress R sigma R^T stands in, which is the same for small strain. Linear: sigma itself.
-    In the plane, the stress across it is what holds that strain at zero.
+    In the plane, the stress across it is what holds that strain at zero.  due: as in `deform`.
     """
     for e in range(n_elements):
         row = w.table[w.material[e]]
-        if row[MODEL] > QUICK:
+        model = row[MODEL]
+        if model > QUICK and model != YIELDING and model != YIELDING_LINEAR:
             continue
         F = edges(w.x, w, e) @ w.gradients[e]
         R = rotation_of(w, e, F, most, 0)
-        strain = _strain(F, R, w, e)
-        sigma = hooke.stress(strain, row[LAMBDA], row[MU])
+        strain = elastic_strain(F, R, w, e, row, due, 0)
+        whole = hooke.stress(strain, row[LAMBDA], row[MU])
+        sigma, across = seen_matrix(whole, w), whole[1, 1]
         cauchy = R @ sigma @ R.transpose()
-        across = row[LAMBDA] * strain.trace()
         det = F.determinant()
-        if row[MODEL] > LINEAR and det > 0:
+        if model > LINEAR and model != YIELDING_LINEAR and det > 0:
             cauchy = R @ sigma @ F.transpose() / det
             across /= det
         w.stress[e] = lifted_matrix(cauchy, w)

@@ -83,7 +83,7 @@ def store_blocks(w: ti.template(), n_elements: ti.i32):
     """After `respond`: blocks V K_ab of what it made the tangent, in `w.tangent`."""
     for k in range(n_elements * w.corner_pairs):
         e = k // w.corner_pairs
-        if w.table[w.material[e]][elements.MODEL] >= elements.FIRST_LAW:
+        if w.table[w.material[e]][elements.MODEL] >= elements.YIELDING_LINEAR:
             # Pair number back to corners: rows of 4, 3, 2 and 1, or of 3, 2 and 1.
             left, a = k % w.corner_pairs, 0
             while left >= w.corners - a:

@@ -4,13 +4,17 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
-from taichifem import elements, isotropic_elements, spring_elements
+from taichifem import elements, isotropic_elements, spring_elements, yielding_elements
 from taichifem.description import Material
+from taichifem.description.material import PLASTICITIES
 from taichifem.formulas.models import MODELS, invertible
 from taichifem.world import Counts, World
 
 ROTATION_ITERATIONS = 400
 """A bound that only nearly degenerate inverted elements come near: one or two iterations are usual."""
+
+ENDLESS = 1e30
+"""Bound of a strain that has none."""
 
 FAST = {elements.LINEAR, elements.COROTATIONAL, elements.QUICK}
 """The models that share the loops of `elements`."""
@@ -29,11 +33,19 @@ class Laws:
             ("linear",): elements.LINEAR,
             ("corotational", "qr"): elements.QUICK,
             ("mass-spring",): elements.SPRINGS,
+            ("mass-spring", "plastic"): elements.SPRINGS,
         }
-        if not exact:
+        if exact:
+            self._numbers["linear", "plastic"] = elements.YIELDING_LINEAR
+            self._numbers["corotational", "plastic"] = elements.YIELDING
+        else:
             self._numbers["corotational",] = elements.COROTATIONAL
+            self._numbers["linear", "plastic"] = elements.LINEAR
+            self._numbers["corotational", "plastic"] = elements.COROTATIONAL
+        self._exact = exact
         self._laws: list[tuple[int, object]] = []
         self._used: set[int] = set()
+        self.plastic = any(m.plasticity != "none" for m in materials)
         for material in materials:
             self._used.add(self.number(material))
 
@@ -48,8 +60,20 @@ class Laws:
 
     def knows(self, material: Material) -> bool:
         """Has the scene a kernel for this material?"""
+        if material.plasticity != "none" and not self.plastic:
+            return False
         number = self._numbers.get(_key(material), -1)
         return number in self._used or (number in FAST and bool(self._used & FAST))
+
+    def row(self, material: Material) -> list[float]:
+        """Its row of the material table: the columns of `elements`."""
+        m, kind = material, PLASTICITIES.index(material.plasticity)
+        flow = [m.yield_stress or 0.0, m.hardening or 0.0, m.viscosity or 0.0]
+        if m.plasticity == "creep":
+            flow = [m.yield_strain, m.max_plastic_strain or ENDLESS, m.creep_rate]
+        elastic = [m.lame_lambda, m.shear_modulus, m.mass_damping, m.stiffness_damping, m.density]
+        pressed = m.compression_limit or flow[0]
+        return [*elastic, float(self.number(m)), m.spring_stiffness or 0.0, float(kind), *flow, pressed]
 
     @property
     def springs(self) -> bool:
@@ -59,7 +83,11 @@ class Laws:
     @property
     def stores_tangents(self) -> bool:
         """Do elements keep their stiffness blocks? Isotropic laws and springs do."""
-        return bool(self._laws) or self.springs
+        return bool(self._laws) or self.springs or self._yielding
+
+    @property
+    def _yielding(self) -> bool:
+        return bool(self._used & {elements.YIELDING, elements.YIELDING_LINEAR})
 
     @property
     def linear(self) -> bool:
@@ -75,28 +103,39 @@ class Laws:
         damping: float = 0.0,
         rate: float = 0.0,
         rate_damping: float = 0.0,
+        due: float = 0.0,
+        within: float = 0.0,
         projected: bool = True,
         keep: bool = False,
     ) -> None:
-        """Corner forces and what assembly needs, at `w.x` and `w.v`; see `elements.deform`."""
+        """Corner forces and what assembly needs, at `w.x` and `w.v`; see `elements.deform`.
+
+        within: time [s] over which what yields flows before it answers, where Newton's method is at work.
+        """
         factors = stiffness, damping, rate, rate_damping
+        within = within if self._exact else 0.0
         if self._used & FAST:
-            elements.deform(w, counts.elements, *factors, ROTATION_ITERATIONS, keep)
+            elements.deform(w, counts.elements, *factors, due, ROTATION_ITERATIONS, keep)
+        if self._yielding:
+            if due > 0 and keep:
+                yielding_elements.settle(w, counts.elements, due, ROTATION_ITERATIONS)
+            yielding_elements.respond(w, counts.elements, *factors, within or due, ROTATION_ITERATIONS, keep)
         if self.springs:
-            spring_elements.stretch(w, counts.elements, *factors, projected)
+            spring_elements.stretch(w, counts.elements, *factors, due, within, keep, projected)
         if self._laws:
             isotropic_elements.decompose(w, counts.elements, ROTATION_ITERATIONS, keep)
             for number, law in self._laws:
                 isotropic_elements.respond(w, law, number, counts.elements, *factors, projected)
+        if self._laws or self._yielding:
             isotropic_elements.store_blocks(w, counts.elements)
 
-    def push(self, w: World, counts: Counts, *, damped: bool) -> None:
+    def push(self, w: World, counts: Counts, *, damped: bool, due: float) -> None:
         """Corner forces alone, with those of stiffness damping if `damped`: what an explicit step needs."""
         rate_damping = float(damped)
         if self._used & FAST:
-            elements.deform(w, counts.elements, 0.0, 0.0, 0.0, rate_damping, ROTATION_ITERATIONS, True)
+            elements.deform(w, counts.elements, 0.0, 0.0, 0.0, rate_damping, due, ROTATION_ITERATIONS, True)
         if self.springs:
-            spring_elements.stretch(w, counts.elements, 0.0, 0.0, 0.0, rate_damping, True)
+            spring_elements.stretch(w, counts.elements, 0.0, 0.0, 0.0, rate_damping, due, 0.0, True, True)
         if self._laws:
             isotropic_elements.decompose(w, counts.elements, ROTATION_ITERATIONS, True)
             for number, law in self._laws:
@@ -105,12 +144,25 @@ class Laws:
                 else:
                     isotropic_elements.push(w, law, number, counts.elements)
 
-    def measure(self, w: World, counts: Counts) -> None:
-        """Cauchy stress and elastic energy of every element."""
-        if self._used & FAST:
-            elements.measure(w, counts.elements, ROTATION_ITERATIONS)
+    def settle(self, w: World, counts: Counts, *, due: float) -> None:
+        """Keep what flows over the time `due` [s] at the present shape."""
+        if self.plastic and due > 0:
+            yielding_elements.settle(w, counts.elements, due, ROTATION_ITERATIONS)
+            if self.springs:
+                spring_elements.settle(w, counts.elements, due)
+
+    def show_plastic(self, w: World, counts: Counts, *, due: float) -> None:
+        """Plastic strain to `w.stress`, and how much has accumulated to `w.energy`; see `yielding_elements.show`."""
+        yielding_elements.show(w, counts.elements, due, ROTATION_ITERATIONS)
         if self.springs:
-            spring_elements.measure(w, counts.elements)
+            spring_elements.show(w, counts.elements, due)
+
+    def measure(self, w: World, counts: Counts, *, due: float = 0.0) -> None:
+        """Cauchy stress and elastic energy of every element."""
+        if self._used & FAST or self._yielding:
+            elements.measure(w, counts.elements, due, ROTATION_ITERATIONS)
+        if self.springs:
+            spring_elements.measure(w, counts.elements, due)
         if self._laws:
             isotropic_elements.decompose(w, counts.elements, ROTATION_ITERATIONS, False)
             for number, law in self._laws:
@@ -122,4 +174,4 @@ def _key(material: Material) -> tuple:
         return material.wraps, material.threshold
     if material.model == "corotational" and material.rotation == "qr":
         return "corotational", "qr"
-    return (material.model,)
+    return (material.model,) if material.plasticity == "none" else (material.model, "plastic")

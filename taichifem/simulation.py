@@ -20,8 +20,13 @@ from taichifem.stats import Stats, figures
 from taichifem.supports import check_supports
 from taichifem.timing import PhaseTimer
 
+OF_NODES = ("x", "v", "v0", "past")
+OF_ELEMENTS = ("rotation",)
 PAST = ("past_x", "past_v")
-"""Fields of integrators that look further back."""
+PLASTIC = ("plastic", "hardened")
+SPRINGS = ("spring_growth", "spring_hardened")
+"""Fields that the next steps depend on: of all scenes; where an integrator looks back; with plastic materials, and
+springs among them."""
 
 
 STATIC_TOLERANCE, STATIC_ITERATIONS = 1e-6, 50_000
@@ -121,6 +126,7 @@ class Simulation(Bodies):
             program=self._program,
             galerkin=self._galerkin,
             follow=self._follow if self._loading.follows else None,
+            due=self._due,
             # Methods that look back start anew where a load jumps: they would smear it over the steps around.
             fresh=self._fresh or self._loading.jumps(self._clock.time, self._clock.end),
             damped=any(m.stiffness_damping > 0 for m in self._materials),
@@ -131,7 +137,9 @@ class Simulation(Bodies):
                 self._report = ADVANCE[scene.integrator](step)
             except Diverged as error:
                 implicit.go_back(self._world, self._counts.nodes)
+                self._due = step.due
                 raise Diverged(f"the simulation diverged at t = {self.time:.4g} s: {error}") from None
+        self._due = self.dt
 
     def advance_frame(self) -> None:
         """Advance to the next frame: `substeps` steps, or what is left of them."""
@@ -174,6 +182,7 @@ class Simulation(Bodies):
     def take_back(self) -> None:
         """Undo the last `balance`: the shape, contacts, loads, and where pins and colliders stand."""
         share, positions, contacts = self._before
+        self._due = 0.0
         self.set_positions(positions)
         self._put_on(share)
         if contacts:
@@ -289,20 +298,11 @@ class Simulation(Bodies):
 
     def save(self, path: str | os.PathLike) -> None:
         """Write everything the next steps depend on; see `load`. Raises InputError if it cannot be written."""
-        w, n, m = self._world, self._counts.nodes, self._counts.elements
+        w = self._world
         with self._kernels():
-            arrays = {
-                "x": transfer.read(w, w.x, n),
-                "v": transfer.read(w, w.v, n),
-                "v0": transfer.read(w, w.v0, n),
-                "past": transfer.read(w, w.past, n),
-                "rotation": transfer.read(w, w.rotation, m),
-                "plastic": transfer.read(w, w.plastic, m),
-                **transfer.read_contacts(w, self._counts.colliders, n),
-            }
-            if self._integrator_remembers:
-                arrays |= {name: transfer.read(w, getattr(w, name), n) for name in PAST}
-        header = {"scene": self._fingerprint(), "clock": asdict(self._clock), "fresh": self._fresh}
+            arrays = {name: transfer.read(w, getattr(w, name), count) for name, count in self._state().items()}
+            arrays |= transfer.read_contacts(w, self._counts.colliders, self._counts.nodes)
+        header = {"scene": self._fingerprint(), "clock": asdict(self._clock), "fresh": self._fresh, "due": self._due}
         checkpoint.write(path, arrays, header)
 
     def load(self, path: str | os.PathLike) -> None:
@@ -317,14 +317,17 @@ class Simulation(Bodies):
             raise InputError(f"{path}: the checkpoint belongs to another scene, time step or precision")
         w = self._world
         with self._kernels():
-            for name in ("x", "v", "v0", "past", "rotation", "plastic", *(PAST if self._integrator_remembers else ())):
+            for name in self._state():
                 transfer.write(w, getattr(w, name), arrays[name])
             transfer.write_contacts(w, arrays)
-        self._clock, self._fresh = clock, bool(header["fresh"])
+        self._clock, self._fresh, self._due = clock, bool(header["fresh"]), float(header["due"])
         self._surroundings.forget()
         self._surround(self.time, self.dt)
         self._stats = self._loaded = None
 
-    @property
-    def _integrator_remembers(self) -> bool:
-        return self.scene.integrator in HISTORY
+    def _state(self) -> dict[str, int]:
+        """Fields that go into a checkpoint, and how many entries of each."""
+        of_nodes = OF_NODES + (PAST if self.scene.integrator in HISTORY else ())
+        of_elements = OF_ELEMENTS + (PLASTIC if self._laws.plastic else ())
+        of_elements += SPRINGS if self._laws.plastic and self._laws.springs else ()
+        return dict.fromkeys(of_nodes, self._counts.nodes) | dict.fromkeys(of_elements, self._counts.elements)

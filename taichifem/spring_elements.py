@@ -6,6 +6,7 @@ Poisson's ratio 1/4 in space and 1/3 in the plane, whatever the material says, a
 """
 
 from taichifem import elements
+from taichifem.formulas import plasticity
 from taichifem.isotropic_elements import corner_pair
 from taichifem.runtime import ti
 
@@ -31,6 +32,79 @@ def _spring(w: ti.template(), e: ti.i32, a: ti.template(), b: ti.template(), num
     return rest, length, along / ti.max(length, 1e-9 * rest), stiffness
 
 
+@ti.func
+def _flow(w: ti.template(), e: ti.i32, number: ti.template(), kind, rest, first_rest, length, dt):
+    """Growth of the rest length [m] and of the plastic strain of spring `number` in dt [s]."""
+    row, alpha = w.table[w.material[e]], w.spring_hardened[e][number]
+    limit, pressed = row[elements.LIMIT], row[elements.PRESSED]
+    stress = _youngs(row), limit, pressed, row[elements.SLOPE], row[elements.RATE]
+    return plasticity.spring_flow(kind, length, rest, first_rest, alpha, *stress, ti.cast(dt, w.real))
+
+
+@ti.func
+def _rest(w: ti.template(), e: ti.i32, number: ti.template(), first_rest, length, due, keep: ti.i32):
+    """Rest length [m] of a spring after flow over the time `due` [s]; keep: what has flowed stays."""
+    rest = first_rest
+    if ti.static(w.capacity.plastic):
+        kind = ti.cast(w.table[w.material[e]][elements.PLASTICITY], ti.i32)
+        rest += w.spring_growth[e][number]
+        if kind > 0 and due > 0:
+            moved, growth = _flow(w, e, number, kind, rest, first_rest, length, due)
+            rest += moved
+            if keep:
+                w.spring_growth[e][number] = rest - first_rest
+                w.spring_hardened[e][number] = w.spring_hardened[e][number] + growth
+    return rest
+
+
+@ti.func
+def _yielding(w: ti.template(), e: ti.i32, number: ti.template(), rest, first_rest, length, within):
+    """Rest length [m] when it flows over the time `within` [s], and the part of the stiffness that is left then."""
+    firm = ti.cast(1.0, w.real)
+    if ti.static(w.capacity.plastic):
+        row = w.table[w.material[e]]
+        kind = ti.cast(row[elements.PLASTICITY], ti.i32)
+        if kind > plasticity.CREEP and within > 0:
+            moved = _flow(w, e, number, kind, rest, first_rest, length, within)[0]
+            if moved != 0:
+                h = row[elements.SLOPE] + row[elements.RATE] / ti.cast(within, w.real)
+                firm = h / (_youngs(row) + h)
+                rest += moved
+    return rest, firm
+
+
+@ti.kernel
+def settle(w: ti.template(), n_elements: ti.i32, due: ti.f64):
+    """Keep what flows over the time `due` [s] at the present lengths."""
+    for e in range(n_elements):
+        if w.table[w.material[e]][elements.MODEL] == elements.SPRINGS:
+            for a in ti.static(range(w.corners)):
+                for b in ti.static(range(a + 1, w.corners)):
+                    number = ti.static(a * w.d + b - 1 - a * (a + 1) // 2)
+                    first_rest, length, _n, _k = _spring(w, e, a, b, number)
+                    _rest(w, e, number, first_rest, length, due, 1)
+
+
+@ti.kernel
+def show(w: ti.template(), n_elements: ti.i32, due: ti.f64):
+    """Plastic strain (3,3), the mean of n n^T times that of each spring, and how much has accumulated, on average."""
+    for e in range(n_elements):
+        if w.table[w.material[e]][elements.MODEL] == elements.SPRINGS:
+            strain, sum_ = ti.Matrix.zero(w.real, w.d, w.d), ti.cast(0.0, w.real)
+            share = ti.static(1 / (w.corner_pairs - w.corners))
+            for a in ti.static(range(w.corners)):
+                for b in ti.static(range(a + 1, w.corners)):
+                    number = ti.static(a * w.d + b - 1 - a * (a + 1) // 2)
+                    first_rest, length, n, _k = _spring(w, e, a, b, number)
+                    rest = _rest(w, e, number, first_rest, length, due, 0)
+                    grown = (rest - first_rest) / first_rest
+                    strain += share * grown * n.outer_product(n)
+                    fresh = (rest - first_rest - w.spring_growth[e][number]) / first_rest
+                    sum_ += share * (w.spring_hardened[e][number] + ti.abs(fresh))
+            w.stress[e] = elements.lifted_matrix(strain, w)
+            w.energy[e] = sum_
+
+
 @ti.kernel
 def stretch(
     w: ti.template(),
@@ -39,11 +113,15 @@ def stretch(
     damping_factor: ti.f64,
     rate_factor: ti.f64,
     rate_damping: ti.f64,
+    due: ti.f64,
+    within: ti.f64,
+    keep: ti.i32,
     projected: ti.i32,
 ):
     """Corner forces and stiffness blocks; the arguments are those of `elements.deform`.
 
     Damping acts along the spring. projected: the part of the stiffness that turns a pressed spring away is left out.
+    within: time [s] over which what yields flows before it answers, for Newton's method.
     """
     for e in range(n_elements):
         row = w.table[w.material[e]]
@@ -57,7 +135,9 @@ def stretch(
             for a in ti.static(range(w.corners)):
                 for b in ti.static(range(a + 1, w.corners)):
                     number = ti.static(a * w.d + b - 1 - a * (a + 1) // 2)
-                    rest, length, n, k = _spring(w, e, a, b, number)
+                    first_rest, length, n, k = _spring(w, e, a, b, number)
+                    rest = _rest(w, e, number, first_rest, length, due, keep)
+                    rest, firm = _yielding(w, e, number, rest, first_rest, length, within)
                     side = 1 - rest / ti.max(length, 1e-9 * rest)
                     if projected:
                         side = ti.max(side, 0.0)
@@ -67,7 +147,7 @@ def stretch(
                     pull = k * ((length - rest) * n + damping * (along @ rate))
                     # What linearisation brings holds for the part across the spring too; damping does not.
                     pull += k * ti.cast(rate_factor, w.real) * side * (across @ rate)
-                    block = k * (factor * along + ti.cast(stiffness_factor, w.real) * side * across)
+                    block = k * (factor * firm * along + ti.cast(stiffness_factor, w.real) * side * across)
                     for c in ti.static(range(w.d)):
                         force[a, c] += pull[c]
                         force[b, c] -= pull[c]
@@ -78,7 +158,7 @@ def stretch(
 
 
 @ti.kernel
-def measure(w: ti.template(), n_elements: ti.i32):
+def measure(w: ti.template(), n_elements: ti.i32, due: ti.f64):
     """Cauchy stress `w.stress` [Pa], the mean over the element of what its springs carry, and energy `w.energy` [J]."""
     for e in range(n_elements):
         if w.table[w.material[e]][elements.MODEL] == elements.SPRINGS:
@@ -87,7 +167,8 @@ def measure(w: ti.template(), n_elements: ti.i32):
             for a in ti.static(range(w.corners)):
                 for b in ti.static(range(a + 1, w.corners)):
                     number = ti.static(a * w.d + b - 1 - a * (a + 1) // 2)
-                    rest, length, n, k = _spring(w, e, a, b, number)
+                    first_rest, length, n, k = _spring(w, e, a, b, number)
+                    rest = _rest(w, e, number, first_rest, length, due, 0)
                     total += k * (length - rest) * length * n.outer_product(n)
                     energy += 0.5 * k * (length - rest) ** 2
             det = (elements.edges(w.x, w, e) @ w.gradients[e]).determinant()

@@ -10,6 +10,7 @@ from collections.abc import Callable
 from dataclasses import dataclass, field, replace
 
 from taichifem.description import Material, Scene
+from taichifem.description.material import ELASTIC
 from taichifem.errors import Diverged
 from taichifem.integrators.step import Iteration, StepReport
 from taichifem.simulation import Simulation
@@ -63,7 +64,7 @@ def static_scene(scene: Scene, *, linear: bool = False) -> Scene:
 
 
 def _hookean(material: Material) -> Material:
-    return replace(material, model="linear", spring_stiffness=None)
+    return replace(material, model="linear", spring_stiffness=None, **ELASTIC)
 
 
 def solve_static(

@@ -45,7 +45,12 @@ def _fill_elements(w: ti.template(), indices: _array(), gradients: _array(), vol
                 w.gradients[e][a, k] = gradients[e, a, k]
         w.volume[e] = volume[e]
         w.rotation[e] = ti.Vector([1.0, 0.0, 0.0, 0.0])
-        w.plastic[e] = ti.Vector.zero(w.real, 6)
+        if ti.static(w.capacity.plastic):
+            w.plastic[e] = ti.Vector.zero(w.real, 6)
+            w.hardened[e] = 0.0
+            if ti.static(w.capacity.springs):
+                w.spring_growth[e] = ti.zero(w.spring_growth[e])
+                w.spring_hardened[e] = ti.zero(w.spring_hardened[e])
 
 
 @ti.kernel
@@ -115,7 +120,7 @@ def _fill_levels(
 @ti.kernel
 def _fill_table(w: ti.template(), table: _array(), body_start: _array(), body_flies: _array()):
     for i in range(table.shape[0]):
-        for k in ti.static(range(7)):
+        for k in ti.static(range(w.table.n)):
             w.table[i][k] = table[i, k]
     for b in range(body_flies.shape[0]):
         w.body_start[b] = body_start[b]
@@ -161,39 +166,34 @@ def _fill_colliders(w: ti.template(), rows: _array()):
                 w.collider_rotation0[c][a, b] = rows[c, 26 + 3 * a + b]
 
 
+def _rank(field) -> int:
+    """Indices of an entry of a field: 0 for a number, 1 for a vector, 2 for a matrix."""
+    return 0 if not hasattr(field, "n") else 1 if field.m == 1 else 2
+
+
 @ti.kernel
 def _write(target: ti.template(), source: _array(), n: ti.i32):
     for i in range(n):
-        for k in ti.static(range(target.n)):
-            target[i][k] = source[i, k]
-
-
-@ti.kernel
-def _write_matrix(target: ti.template(), source: _array(), n: ti.i32):
-    for i in range(n):
-        for a in ti.static(range(target.n)):
-            for b in ti.static(range(target.m)):
+        if ti.static(_rank(target) == 0):
+            target[i] = source[i]
+        elif ti.static(_rank(target) == 1):
+            for k in ti.static(range(target.n)):
+                target[i][k] = source[i, k]
+        else:
+            for a, b in ti.static(ti.ndrange(target.n, target.m)):
                 target[i][a, b] = source[i, a, b]
 
 
 @ti.kernel
 def _read(source: ti.template(), target: _array(), n: ti.i32):
     for i in range(n):
-        for k in ti.static(range(source.n)):
-            target[i, k] = source[i][k]
-
-
-@ti.kernel
-def _read_scalar(source: ti.template(), target: _array(), n: ti.i32):
-    for i in range(n):
-        target[i] = source[i]
-
-
-@ti.kernel
-def _read_matrix(source: ti.template(), target: _array(), n: ti.i32):
-    for i in range(n):
-        for a in ti.static(range(source.n)):
-            for b in ti.static(range(source.m)):
+        if ti.static(_rank(source) == 0):
+            target[i] = source[i]
+        elif ti.static(_rank(source) == 1):
+            for k in ti.static(range(source.n)):
+                target[i, k] = source[i][k]
+        else:
+            for a, b in ti.static(ti.ndrange(source.n, source.m)):
                 target[i, a, b] = source[i][a, b]
 
 
@@ -248,7 +248,7 @@ def fill_levels(
 
 
 def fill_table(w: World, table: np.ndarray, body_start: np.ndarray, body_flies: np.ndarray) -> None:
-    """Material rows (materials,7), node ranges of the bodies, and how each flies (`linear_algebra.balance`)."""
+    """Material rows (materials,12), node ranges of the bodies, and how each flies (`linear_algebra.balance`)."""
     _fill_table(w, _real(w, table), body_start, body_flies.astype(np.int32))
 
 
@@ -272,23 +272,15 @@ def fill_colliders(w: World, rows: np.ndarray) -> None:
 
 def read(w: World, field, n: int) -> np.ndarray:
     """The first n entries of a scalar, vector or matrix field, in the world's precision."""
-    shape = getattr(field, "n", None), getattr(field, "m", None)
-    if shape[0] is None:
-        target = np.empty(n, dtype=dtype_of(w))
-        _read_scalar(field, target, n)
-    elif shape[1] == 1:
-        target = np.empty((n, shape[0]), dtype=dtype_of(w))
-        _read(field, target, n)
-    else:
-        target = np.empty((n, *shape), dtype=dtype_of(w))
-        _read_matrix(field, target, n)
+    shape = (n, *((field.n, field.m)[: _rank(field)] if _rank(field) else ()))
+    target = np.empty(shape, dtype=dtype_of(w))
+    _read(field, target, n)
     return target
 
 
 def write(w: World, field, array: np.ndarray) -> None:
-    """Set the first entries of a vector field from (n,k), or of a matrix field from (n,k,l)."""
-    write_entries = _write if array.ndim == 2 else _write_matrix
-    write_entries(field, _real(w, array), len(array))
+    """Set the first entries of a scalar, vector or matrix field from (n), (n,k) or (n,k,l)."""
+    _write(field, _real(w, array), len(array))
 
 
 def read_contacts(w: World, n_colliders: int, n: int) -> dict[str, np.ndarray]:

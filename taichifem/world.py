@@ -58,6 +58,7 @@ class Capacity:
     dimension: int = 3  # of the elements: 3 for tetrahedra, 2 for triangles in the plane y = 0
     tangents: bool = False  # do elements store their stiffness blocks? Isotropic laws and springs need it
     springs: bool = False  # are there elements made of springs?
+    plastic: bool = False  # are there plastic materials?
 
     LEAST = (256, 1024, 4096, 2048, 8, 4, 256, 256, 8, 8, 32, 1024, 256, 1024, 64)
 
@@ -93,7 +94,8 @@ class World:
     `drag` mass-proportional damping [kg/s], `outside` loads [N], `free` 1 or 0 per axis, `dv` the unknown of the
     step, `base_x` and `base_v`: what an implicit step starts from (`integrators.implicit`).
     Elements: `cell` nodes (d+1), `material` row, `gradients` rows g_1..g_d of D_m^-1 (B of the slides), `volume`
-    [m^3], `rotation` quaternion, `plastic` strain (xx, yy, zz, xy, yz, zx), `body`, and per step `h` (rotated
+    [m^3], `rotation` quaternion, `plastic` strain (xx, yy, zz, xy, yz, zx) and `hardened`, how much of it has
+    accumulated, `body`, and per step `h` (rotated
     gradients, corner by corner) and `corner_force` [N].
     """
 
@@ -144,7 +146,9 @@ class World:
         self.cell = self._vector(m, corners, ti.i32)
         self.material, self.body = self._scalar(m, ti.i32), self._scalar(m, ti.i32)
         self.gradients, self.volume = self._matrix(m, d, d), self._scalar(m)
-        self.rotation, self.plastic = self._vector(m, 4), self._vector(m, 6)
+        self.rotation = self._vector(m, 4)
+        k = m if self.capacity.plastic else 1
+        self.plastic, self.hardened = self._vector(k, 6), self._scalar(k)
         self.h, self.corner_force = (self._vector(corners * m, d) for _ in range(2))
         self.moduli = self._vector(m, 2)  # lambda and mu, times the step's factor of K
         self.stress = self._matrix(m, 3, 3)
@@ -155,9 +159,12 @@ class World:
         self.stretch = self._vector(k, d)
         self.tangent_p, self.tangent_q = self._vector(k, pairs), self._vector(k, pairs)
         # Springs: of the stiffness given for a whole edge, the part that each edge of this element has.
-        self.spring_share = self._vector(m if self.capacity.springs else 1, self.corner_pairs - corners)
+        springs = self.corner_pairs - corners
+        self.spring_share = self._vector(m if self.capacity.springs else 1, springs)
+        k = m if self.capacity.springs and self.capacity.plastic else 1
+        self.spring_growth, self.spring_hardened = self._vector(k, springs), self._vector(k, springs)
         # Material table: the columns are those of `elements`.
-        self.table = self._vector(self.capacity.materials, 7)
+        self.table = self._vector(self.capacity.materials, 12)
 
     def _place_matrix(self) -> None:
         c = self.capacity

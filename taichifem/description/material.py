@@ -10,11 +10,22 @@ from taichifem.errors import InputError
 MODELS = ("mass-spring", "linear", "corotational", "stvk", "neo-hookean", "invertible")
 WRAPPED = ("corotational", "stvk", "neo-hookean")
 ROTATIONS = ("polar", "qr")
+PLASTICITIES = ("none", "creep", "von-mises", "tresca")
+
+CREEP_KEYS = ("yield_strain", "creep_rate", "max_plastic_strain")
+YIELD_KEYS = ("yield_stress", "hardening", "viscosity")
+"""What only creep, and only the laws with a yield stress, know."""
+
+ELASTIC = dict.fromkeys((*CREEP_KEYS, *YIELD_KEYS, "compression_limit")) | {"plasticity": "none"}
+"""Changes that take a material's plasticity away."""
+
+PLASTIC = ("mass-spring", "linear", "corotational")
+"""Models that can be plastic."""
 
 
 @dataclass(frozen=True, kw_only=True)
 class Material:
-    """An isotropic elastic material.
+    """An isotropic material, elastic or elasto-plastic.
 
     model: "corotational" (Mueller & Gross 2004), "linear" (small strain; swells when it turns), "stvk" (St.
     Venant-Kirchhoff; gives way in compression), "neo-hookean" (stable form of Smith et al. 2018), "invertible": the
@@ -27,6 +38,12 @@ class Material:
     density: [kg/m^3], above 0.
     mass_damping: Rayleigh alpha [1/s], slows every motion.  stiffness_damping: Rayleigh beta [s], slows
     deformation only.
+    plasticity: what stays when the load is gone, of "linear", "corotational" and "mass-spring" materials. "none";
+    "creep" (Mueller & Gross 2004): of an elastic strain larger than `yield_strain`, the part `creep_rate` [1/s] times
+    dt in every step, until `max_plastic_strain` (None: no end) is reached, strains being measured by their Frobenius
+    norm; "von-mises" and "tresca": strain beyond `yield_stress` [Pa], which grows by `hardening` [Pa] times the plastic
+    strain and is overstepped by `viscosity` [Pa s] times its rate. Springs yield one by one, in pressure at
+    `compression_limit` in place of the first limit, if it is given.
     Raises InputError for values outside these bounds.
     """
 
@@ -40,6 +57,14 @@ class Material:
     threshold: float = 0.3
     rotation: str = "polar"
     spring_stiffness: float | None = None
+    plasticity: str = "none"
+    yield_strain: float | None = None
+    creep_rate: float | None = None
+    max_plastic_strain: float | None = None
+    yield_stress: float | None = None
+    hardening: float | None = None
+    viscosity: float | None = None
+    compression_limit: float | None = None
 
     def __post_init__(self) -> None:
         check.choice("model", self.model, MODELS)
@@ -55,6 +80,33 @@ class Material:
             check.number("spring_stiffness", self.spring_stiffness, above=0, unit="N/m")
             if self.model != "mass-spring":
                 raise InputError(f'spring_stiffness belongs to "mass-spring", and the model is {self.model!r}: drop it')
+        self._check_plasticity()
+
+    def _check_plasticity(self) -> None:
+        check.choice("plasticity", self.plasticity, PLASTICITIES)
+        if self.plasticity != "none" and self.model not in PLASTIC:
+            raise InputError(
+                f"plasticity {self.plasticity!r} does not go with the model {self.model!r}: "
+                f"choose one of {', '.join(map(repr, PLASTIC))}"
+            )
+        if self.compression_limit is not None:
+            check.number("compression_limit", self.compression_limit, above=0)
+            if self.model != "mass-spring" or self.plasticity == "none":
+                raise InputError("compression_limit belongs to plastic springs: drop it, or see model and plasticity")
+        creeps, yields = self.plasticity == "creep", self.plasticity in ("von-mises", "tresca")
+        for keys, belong, laws in ((CREEP_KEYS, creeps, '"creep"'), (YIELD_KEYS, yields, '"von-mises" and "tresca"')):
+            for key in keys:
+                if getattr(self, key) is not None and not belong:
+                    raise InputError(f"{key} belongs to {laws}, and plasticity is {self.plasticity!r}: drop it")
+        if creeps:
+            _required("creep", "yield_strain", self.yield_strain, "")
+            _required("creep", "creep_rate", self.creep_rate, "1/s")
+            if self.max_plastic_strain is not None:
+                check.number("max_plastic_strain", self.max_plastic_strain, above=0)
+        if yields:
+            _required(self.plasticity, "yield_stress", self.yield_stress, "Pa")
+            check.number("hardening", self.hardening or 0, at_least=0, unit="Pa")
+            check.number("viscosity", self.viscosity or 0, at_least=0, unit="Pa s")
 
     @property
     def shear_modulus(self) -> float:
@@ -65,3 +117,9 @@ class Material:
     def lame_lambda(self) -> float:
         """First Lame parameter lambda = E nu / ((1 + nu) (1 - 2 nu)) [Pa]."""
         return self.youngs * self.poisson / ((1 + self.poisson) * (1 - 2 * self.poisson))
+
+
+def _required(law: str, name: str, value: float | None, unit: str) -> None:
+    if value is None:
+        raise InputError(f"plasticity {law!r} needs {name}{f' [{unit}]' if unit else ''}: give it")
+    check.number(name, value, above=0, unit=unit)

@@ -188,6 +188,8 @@ def _linearise(step: Step, h: float, inertia: bool, *, first: bool = False, exac
             damping=h * damped,
             rate=rate,
             rate_damping=damped,
+            due=step.take_due(),
+            within=step.dt,
             projected=not exact,
             keep=True,
         )

@@ -41,7 +41,7 @@ def advance(step: Step) -> StepReport:
     if step.fresh:
         if step.follow is not None:
             step.follow()
-        step.laws.deform(w, step.counts, stiffness=0.0, rate_damping=1.0, keep=True)
+        step.laws.deform(w, step.counts, stiffness=0.0, rate_damping=1.0, due=step.take_due(), keep=True)
         _accelerate(w, n, *step.gravity)
     _half_way(w, n, h)
     report = implicit.solve(step, h=h, newton=step.options.newton)

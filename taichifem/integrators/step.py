@@ -58,6 +58,7 @@ class Step:
 
     gravity: (3,) [m/s^2].  program, galerkin: of the linear solver (`pcg.solve`).
     follow: brings loads that follow the surface up to date, where there are any.
+    due: time over which plastic flow is due [s]: the last step has moved the nodes, but nothing has flowed since.
     fresh: there is no past step to go on from.  damped: has some material stiffness damping?
     """
 
@@ -71,5 +72,11 @@ class Step:
     program: np.ndarray
     galerkin: Galerkin | None
     follow: Callable[[], None] | None = None
+    due: float = 0.0
     fresh: bool = True
     damped: bool = True
+
+    def take_due(self) -> float:
+        """The time over which plastic flow is due, from then on none."""
+        due, self.due = self.due, 0.0
+        return due

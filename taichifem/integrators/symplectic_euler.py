@@ -88,7 +88,7 @@ def advance(step: Step) -> StepReport:
     with step.timer.phase("forces"):
         if step.follow is not None:
             step.follow()
-        step.laws.push(w, step.counts, damped=step.damped)
+        step.laws.push(w, step.counts, damped=step.damped, due=step.take_due())
         _load(w, n, dt, *step.gravity)
         holding.hold(w, n, step.counts.held, dt, dt)
 

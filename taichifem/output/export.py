@@ -76,7 +76,8 @@ def _safe(name: str) -> str:
 
 
 def write_vtu(path: Path, simulation: Any, **point_data: np.ndarray) -> None:
-    """Write the state of `simulation` as a .vtu file: displacement, velocity, stress, bodies, and further node data."""
+    """Write the state of `simulation` as a .vtu file: displacement, velocity, stress, plastic strain, bodies,
+    and further node data."""
     points, kind = simulation.positions, "tetra" if simulation.cells.shape[1] == 4 else "triangle"
     meshio.Mesh(
         points,
@@ -89,6 +90,8 @@ def write_vtu(path: Path, simulation: Any, **point_data: np.ndarray) -> None:
         cell_data={
             "von_mises": [simulation.von_mises()],
             "cauchy_stress": [simulation.cauchy_stress().reshape(-1, 9)],
+            "plastic_strain": [simulation.plastic_strain().reshape(-1, 9)],
+            "equivalent_plastic_strain": [simulation.equivalent_plastic_strain()],
             "body": [np.asarray(simulation.cell_bodies, np.int32)],
             "region": [np.asarray(simulation.cell_regions, np.int32)],
         },
@@ -124,6 +127,8 @@ def _npz(path: Path, simulation: Any) -> None:
             surface=simulation.surface,
             von_mises=simulation.von_mises(),
             cauchy_stress=simulation.cauchy_stress(),
+            plastic_strain=simulation.plastic_strain(),
+            equivalent_plastic_strain=simulation.equivalent_plastic_strain(),
         )
 
 

@@ -151,6 +151,10 @@ class FrameBuilder:
             stress = np.asarray(simulation.von_mises(), float)
             stress = self._to_nodes(np.asarray(simulation.cells), stress, len(simulation.positions))
             return stress.astype(np.float32), "von Mises stress", "Pa"
+        if what == "plastic-strain":
+            strain = simulation.equivalent_plastic_strain()
+            strain = self._to_nodes(np.asarray(simulation.cells), strain, len(simulation.positions))
+            return strain.astype(np.float32), "plastic strain", ""
         if what == "displacement":
             moved = np.asarray(simulation.positions) - np.asarray(simulation.rest_positions)
             return np.linalg.norm(moved, axis=1).astype(np.float32), "displacement", "m"

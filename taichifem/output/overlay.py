@@ -20,6 +20,8 @@ _PREFIXES = ((1e9, "G"), (1e6, "M"), (1e3, "k"), (1.0, ""), (1e-3, "m"), (1e-6, 
 
 def engineering(value: float, unit: str) -> tuple[float, str]:
     """(factor, unit with prefix) in which numbers of about `value` read well: 12500 Pa -> (1e3, "kPa")."""
+    if not unit:
+        return 1.0, ""
     if unit == "m" and 1e-3 <= abs(value) < 1:
         return (1e-2, "cm") if abs(value) >= 1e-2 else (1e-3, "mm")
     for factor, prefix in _PREFIXES:

@@ -42,6 +42,12 @@ class StubSimulation:
     def von_mises(self) -> np.ndarray:
         return np.arange(len(self.cells)) + 10.0 * self.frame
 
+    def plastic_strain(self) -> np.ndarray:
+        return 1e-3 * self.cauchy_stress()
+
+    def equivalent_plastic_strain(self) -> np.ndarray:
+        return 1e-3 * self.von_mises()
+
     @property
     def stats(self) -> SimpleNamespace:
         figures = {"frame": self.frame, "energy": {"total": np.float32(1.5)}, "residual": float("nan")}
