@@ -117,7 +117,10 @@ LAWS = {
 }
 
 
-@pytest.mark.parametrize("law", LAWS)
+SLOW = pytest.mark.slow
+
+
+@pytest.mark.parametrize("law", ["creep", *(pytest.param(law, marks=SLOW) for law in LAWS if law != "creep")])
 def test_a_bent_bar_stays_bent_and_does_not_drift(law):
     simulation = pressed_bar(LAWS[law])
     simulation.advance(seconds=0.5)
@@ -140,7 +143,7 @@ def test_halving_the_step_hardly_changes_what_stays():
 
 
 @pytest.mark.parametrize("law", LAWS)
-@pytest.mark.parametrize("integrator", ["backward-euler", "backward-euler-newton"])
+@pytest.mark.parametrize("integrator", ["backward-euler", pytest.param("backward-euler-newton", marks=SLOW)])
 def test_energy_only_falls_once_nothing_drives(law, integrator):
     simulation = pressed_bar(LAWS[law], integrator=integrator)
     simulation.advance(seconds=0.55)
