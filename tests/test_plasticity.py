@@ -39,13 +39,11 @@ def stretched(points, law: tf.Material) -> tf.Simulation:
 
 
 @pytest.mark.parametrize("law", ["von-mises", "tresca"])
-@pytest.mark.parametrize("case", range(8))
+@pytest.mark.parametrize("case", range(3))
 def test_uniaxial_path(oracles, law, case):
     """Load, unload, reload and reverse with linear hardening; the two laws agree there."""
     cases = json.loads((oracles / "j2_uniaxial_path.json").read_text())["cases"]
-    if case >= len(cases) or cases[case]["hardening"] != "isotropic":
-        pytest.skip("isotropic hardening only")
-    data, scale = cases[case], 1e-9
+    data, scale = [row for row in cases if row["hardening"] == "isotropic"][case], 1e-9
     limits = dict(yield_stress=data["sigma_y"] * scale, hardening=data["H"] * scale)
     steel = material(youngs=data["E"] * scale, plasticity=law, **limits)
     simulation = stretched([row[0] for row in data["rows"]], steel)

@@ -14,7 +14,7 @@ ARCHES = ("cpu", "cuda", "vulkan", "metal")
 PRECISIONS = ("f32", "f64")
 MODELS = ("mass-spring", "linear", "corotational", "stvk", "neo-hookean", "invertible")
 RENDERERS = ("auto", "taichi", "ggui", "pyvista")
-COLORS = ("material", "von-mises", "displacement", "speed")
+COLORS = ("material", "von-mises", "plastic-strain", "displacement", "speed")
 EXPORTS = ("vtu", "ply", "obj", "npz")
 
 FILE = click.Path(dir_okay=False, path_type=Path)
