@@ -199,3 +199,23 @@ def test_an_elastic_scene_has_no_room_for_plasticity():
     assert not simulation.plastic_strain().any()
     with pytest.raises(tf.InputError, match="no plastic material yet"):
         simulation.set_material(0, tf.Material(plasticity="von-mises", yield_stress=1e3))
+
+
+@pytest.mark.parametrize("model", ["linear", "corotational"])
+def test_in_the_plane_flow_goes_across_it_too(model):
+    """Plane strain: no whole strain across the plane, but plastic strain without trace and a stress within bounds."""
+    mesh = tf.TriMesh.rectangle(size=(1.0, 1.0), cells=(2, 2))
+    law = material(model=model, youngs=1e5, yield_stress=3e2, hardening=1e3)
+    pins = [
+        tf.Pin(region=box(upper=(1e-6, 1e3, 1e3))),
+        tf.Pin(region=box(lower=(1 - 1e-6, -1e3, -1e3)), motion=path([0.02])),
+    ]
+    simulation = quasi_static(tf.Body(mesh=mesh, material=law, pins=pins), newton_tolerance=1e-8)
+    simulation.step()
+    assert simulation.report.balanced
+    plastic, alpha = simulation.plastic_strain(), simulation.equivalent_plastic_strain()
+    assert alpha.min() > 1e-3
+    assert abs(np.trace(plastic, axis1=1, axis2=2)).max() < 1e-14
+    assert abs(plastic[:, 1, 1]).max() > 1e-4
+    if model == "linear":  # the others' Cauchy stress is per deformed area, which the pressure here shows
+        assert simulation.von_mises() == pytest.approx(300 + 1e3 * alpha, rel=1e-9)
