@@ -12,10 +12,10 @@ LAMBDA, MU, MASS_DAMPING, STIFFNESS_DAMPING, DENSITY, MODEL, SPRING, PLASTICITY,
 the kind of law (`formulas.plasticity`) and its yield stress, hardening and viscosity, or for creep yield strain,
 most plastic strain and rate; PRESSED: the limit of springs under pressure."""
 
-LINEAR, COROTATIONAL, QUICK, SPRINGS, YIELDING_LINEAR, YIELDING, FIRST_LAW = range(7)
+LINEAR, COROTATIONAL, QUICK, SPRINGS, YIELDING_LINEAR, YIELDING, YIELDING_GREEN, FIRST_LAW = range(8)
 """What MODEL may be: up to QUICK (corotational by QR) they have the fast road below; SPRINGS are in
-`spring_elements`; the plastic ones that Newton's method wants exact tangents of, in `yielding_elements`; from FIRST_LAW
-on come the isotropic laws of the scene."""
+`spring_elements`; the plastic ones that Newton's method wants exact tangents of, and those that measure Green's strain
+(St. Venant-Kirchhoff), in `yielding_elements`; from FIRST_LAW on come the isotropic laws of the scene."""
 
 AXES = {2: (0, 2), 3: (0, 1, 2)}
 """Coordinates of the nodes that elements of dimension d see."""
@@ -73,9 +73,9 @@ def plastic_law(row):
 
 @ti.func
 def elastic_strain(F, R, w: ti.template(), e: ti.i32, row, dt, keep: ti.i32):
-    """Elastic strain in the rotated frame (3,3): sym(R^T F) - I - eps_p, after plastic flow over dt [s], if any.
+    """Elastic strain in the element's frame (3,3): sym(R^T F) - I - eps_p, after plastic flow over dt [s], if any.
 
-    keep: what has flowed stays.
+    Of Green's strain, whose frame R is F itself, it is (F^T F - I) / 2 - eps_p.  keep: what has flowed stays.
     """
     small = symmetric(R.transpose() @ F)
     for k in ti.static(range(w.d)):
@@ -84,6 +84,8 @@ def elastic_strain(F, R, w: ti.template(), e: ti.i32, row, dt, keep: ti.i32):
     # Not one condition: where no field for it is there, the second must not be compiled.
     if ti.static(w.capacity.plastic):  # noqa: SIM102
         if row[PLASTICITY] > 0:
+            if row[MODEL] == YIELDING_GREEN:
+                strain *= 0.5
             strain -= plastic_strain.kept(w, e)
             if dt > 0:
                 law = plastic_law(row)
@@ -95,12 +97,17 @@ def elastic_strain(F, R, w: ti.template(), e: ti.i32, row, dt, keep: ti.i32):
 
 
 @ti.func
-def rotation_of(w: ti.template(), e: ti.i32, F, most: ti.i32, keep: ti.i32):
-    """Rotation (d,d) of element e, found from its last one, which it replaces if `keep`; the identity if linear."""
+def frame_of(w: ti.template(), e: ti.i32, F, most: ti.i32, keep: ti.i32):
+    """What takes the strain of element e to the axes of the world (d,d).
+
+    Its rotation, found from the last one, which it replaces if `keep`; the identity if linear; F for Green's strain.
+    """
     R = ti.Matrix.identity(w.real, w.d)
     model = w.table[w.material[e]][MODEL]
     if model == QUICK:
         R = rotation.orthonormal(F)
+    elif model == YIELDING_GREEN:
+        R = F
     elif model > LINEAR and model != YIELDING_LINEAR:
         if ti.static(w.d == 2):
             R = rotation.nearest_rotation_2d(F)
@@ -118,9 +125,18 @@ def _tolerance(precision: str) -> float:
 
 
 @ti.func
-def gradient(w: ti.template(), e: ti.i32, a: ti.i32):
-    """Shape gradient g_a of corner a (d,) [1/m]."""
+def gradients_of(w: ti.template(), e: ti.i32):
+    """The rows g_1..g_d [1/m] that take edges to F, or to F_e where plasticity is multiplicative."""
     D = w.gradients[e]
+    if ti.static(w.capacity.plastic):  # noqa: SIM102
+        if w.table[w.material[e]][MODEL] >= FIRST_LAW:
+            D = D @ seen_matrix(w.plastic_inverse[e], w)
+    return D
+
+
+@ti.func
+def gradient(D, w: ti.template(), a: ti.i32):
+    """Of the rows D, that of corner a (d,) [1/m]: its shape gradient."""
     g = ti.Vector.zero(w.real, w.d)
     for b in ti.static(range(w.d)):
         row = ti.Vector([D[b, k] for k in ti.static(range(w.d))])
@@ -180,7 +196,7 @@ def deform(
             continue
         gradients = w.gradients[e]
         F = edges(w.x, w, e) @ gradients
-        R = rotation_of(w, e, F, most, keep)
+        R = frame_of(w, e, F, most, keep)
         rate = symmetric(R.transpose() @ (edges(w.v, w, e) @ gradients))
         damping = row[STIFFNESS_DAMPING]
         share = ti.cast(rate_factor, w.real) + ti.cast(rate_damping, w.real) * damping
@@ -221,10 +237,10 @@ def measure(w: ti.template(), n_elements: ti.i32, due: ti.f64, most: ti.i32):
     for e in range(n_elements):
         row = w.table[w.material[e]]
         model = row[MODEL]
-        if model > QUICK and model != YIELDING and model != YIELDING_LINEAR:
+        if model == SPRINGS or model >= FIRST_LAW:
             continue
         F = edges(w.x, w, e) @ w.gradients[e]
-        R = rotation_of(w, e, F, most, 0)
+        R = frame_of(w, e, F, most, 0)
         strain = elastic_strain(F, R, w, e, row, due, 0)
         whole = hooke.stress(strain, row[LAMBDA], row[MU])
         sigma, across = seen_matrix(whole, w), whole[1, 1]
@@ -251,7 +267,7 @@ def gather_masses(w: ti.template(), n: ti.i32, n_bodies: ti.i32, inertia: ti.i32
         for k in range(w.incident_start[i], w.incident_start[i + 1]):
             e, a = w.incident[k] >> 2, w.incident[k] & 3
             row = w.table[w.material[e]]
-            g = gradient(w, e, a)
+            g = gradient(w.gradients[e], w, a)
             share = row[DENSITY] * w.volume[e] / w.corners
             mass += share
             drag += share * row[MASS_DAMPING]

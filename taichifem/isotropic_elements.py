@@ -18,11 +18,11 @@ def corner_pair(w: ti.template(), a: ti.i32, b: ti.i32):
 
 @ti.kernel
 def decompose(w: ti.template(), n_elements: ti.i32, most: ti.i32, keep: ti.i32):
-    """F = U diag(s) V^T of every element with an isotropic law."""
+    """F = U diag(s) V^T of every element with an isotropic law; of plastic ones, F_e."""
     for e in range(n_elements):
         if w.table[w.material[e]][elements.MODEL] >= elements.FIRST_LAW:
-            F = elements.edges(w.x, w, e) @ w.gradients[e]
-            U, s, V = eigen.signed_svd(F, elements.rotation_of(w, e, F, most, keep))
+            F = elements.edges(w.x, w, e) @ elements.gradients_of(w, e)
+            U, s, V = eigen.signed_svd(F, elements.frame_of(w, e, F, most, keep))
             w.svd_u[e] = U
             w.svd_v[e] = V
             w.stretch[e] = s
@@ -90,10 +90,16 @@ def store_blocks(w: ti.template(), n_elements: ti.i32):
                 left -= w.corners - a
                 a += 1
             b = a + left
-            g_a, g_b = elements.gradient(w, e, a), elements.gradient(w, e, b)
+            D = elements.gradients_of(w, e)
+            g_a, g_b = elements.gradient(D, w, a), elements.gradient(D, w, b)
             block = isotropic.stiffness_block(
                 g_a, g_b, w.svd_u[e], w.svd_v[e], w.tangent_a[e], w.tangent_p[e], w.tangent_q[e]
             )
+            if w.table[w.material[e]][elements.MODEL] == elements.YIELDING_GREEN:
+                Q, stress = w.svd_v[e], w.stretch[e]
+                turning = (stress * (Q.transpose() @ g_a)).dot(Q.transpose() @ g_b)
+                for j in ti.static(range(w.d)):
+                    block[j, j] += turning
             w.tangent[k] = w.volume[e] * block
 
 

@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import dataclass
 
-from taichifem import elements, isotropic_elements, spring_elements, yielding_elements
+from taichifem import elements, flowing_elements, isotropic_elements, spring_elements, yielding_elements
 from taichifem.description import Material
 from taichifem.description.material import PLASTICITIES
 from taichifem.formulas.models import MODELS, invertible
@@ -17,7 +18,21 @@ ENDLESS = 1e30
 """Bound of a strain that has none."""
 
 FAST = {elements.LINEAR, elements.COROTATIONAL, elements.QUICK}
-"""The models that share the loops of `elements`."""
+YIELDING = {elements.YIELDING_LINEAR, elements.YIELDING, elements.YIELDING_GREEN}
+"""The models that share the loops of `elements`, and those of `yielding_elements`."""
+
+
+@dataclass(frozen=True)
+class _Law:
+    """An isotropic law of a scene: its number in the material table, its functions, and whether it flows."""
+
+    number: int
+    law: object
+    plastic: bool
+
+    @property
+    def of(self) -> tuple[object, int]:
+        return self.law, self.number
 
 
 class Laws:
@@ -34,6 +49,7 @@ class Laws:
             ("corotational", "qr"): elements.QUICK,
             ("mass-spring",): elements.SPRINGS,
             ("mass-spring", "plastic"): elements.SPRINGS,
+            ("stvk", "plastic"): elements.YIELDING_GREEN,
         }
         if exact:
             self._numbers["linear", "plastic"] = elements.YIELDING_LINEAR
@@ -43,7 +59,7 @@ class Laws:
             self._numbers["linear", "plastic"] = elements.LINEAR
             self._numbers["corotational", "plastic"] = elements.COROTATIONAL
         self._exact = exact
-        self._laws: list[tuple[int, object]] = []
+        self._laws: list[_Law] = []
         self._used: set[int] = set()
         self.plastic = any(m.plasticity != "none" for m in materials)
         for material in materials:
@@ -53,9 +69,10 @@ class Laws:
         """The model number of a material; a law that is new to the scene gets the next one."""
         key = _key(material)
         if key not in self._numbers:
-            law = MODELS[key[0]] if len(key) == 1 else invertible.wrap(MODELS[key[0]], key[1])
+            name, *threshold = key[:-1] if key[-1] == "plastic" else key
+            law = invertible.wrap(MODELS[name], *threshold) if threshold else MODELS[name]
             self._numbers[key] = elements.FIRST_LAW + len(self._laws)
-            self._laws.append((self._numbers[key], law))
+            self._laws.append(_Law(self._numbers[key], law, key[-1] == "plastic"))
         return self._numbers[key]
 
     def knows(self, material: Material) -> bool:
@@ -87,7 +104,7 @@ class Laws:
 
     @property
     def _yielding(self) -> bool:
-        return bool(self._used & {elements.YIELDING, elements.YIELDING_LINEAR})
+        return bool(self._used & YIELDING)
 
     @property
     def linear(self) -> bool:
@@ -114,48 +131,79 @@ class Laws:
         """
         factors = stiffness, damping, rate, rate_damping
         within = within if self._exact else 0.0
+        # Where what is due has just become plastic strain, it does not flow once more.
+        span = within or (0.0 if keep else due)
         if self._used & FAST:
             elements.deform(w, counts.elements, *factors, due, ROTATION_ITERATIONS, keep)
         if self._yielding:
-            if due > 0 and keep:
-                yielding_elements.settle(w, counts.elements, due, ROTATION_ITERATIONS)
-            yielding_elements.respond(w, counts.elements, *factors, within or due, ROTATION_ITERATIONS, keep)
+            self._yield(w, counts, *factors, due=due, span=span, keep=keep, projected=projected)
         if self.springs:
             spring_elements.stretch(w, counts.elements, *factors, due, within, keep, projected)
         if self._laws:
-            isotropic_elements.decompose(w, counts.elements, ROTATION_ITERATIONS, keep)
-            for number, law in self._laws:
-                isotropic_elements.respond(w, law, number, counts.elements, *factors, projected)
+            self._decompose(w, counts, due if keep else 0.0, keep=keep)
+            for law in self._laws:
+                if law.plastic:
+                    flowing_elements.respond(
+                        w, law.law, span > 0, law.number, counts.elements, *factors, span, projected
+                    )
+                else:
+                    isotropic_elements.respond(w, *law.of, counts.elements, *factors, projected)
         if self._laws or self._yielding:
             isotropic_elements.store_blocks(w, counts.elements)
+
+    def _yield(self, w, counts, *factors: float, due: float, span: float, keep: bool, projected: bool) -> None:
+        if due > 0 and keep:
+            yielding_elements.settle(w, counts.elements, due, ROTATION_ITERATIONS, elements.YIELDING_LINEAR)
+        yielding_elements.respond(w, counts.elements, *factors, span, ROTATION_ITERATIONS, keep, projected)
 
     def push(self, w: World, counts: Counts, *, damped: bool, due: float) -> None:
         """Corner forces alone, with those of stiffness damping if `damped`: what an explicit step needs."""
         rate_damping = float(damped)
         if self._used & FAST:
             elements.deform(w, counts.elements, 0.0, 0.0, 0.0, rate_damping, due, ROTATION_ITERATIONS, True)
+        if self._yielding:
+            factors = 0.0, 0.0, 0.0, rate_damping
+            self._yield(w, counts, *factors, due=due, span=0.0, keep=True, projected=True)
         if self.springs:
             spring_elements.stretch(w, counts.elements, 0.0, 0.0, 0.0, rate_damping, due, 0.0, True, True)
         if self._laws:
-            isotropic_elements.decompose(w, counts.elements, ROTATION_ITERATIONS, True)
-            for number, law in self._laws:
-                if damped:
-                    isotropic_elements.respond(w, law, number, counts.elements, 0.0, 0.0, 0.0, rate_damping, True)
+            self._decompose(w, counts, due, keep=True)
+            for law in self._laws:
+                if law.plastic:
+                    factors = 0.0, 0.0, 0.0, rate_damping
+                    flowing_elements.respond(w, law.law, False, law.number, counts.elements, *factors, 0.0, True)
+                elif damped:
+                    isotropic_elements.respond(w, *law.of, counts.elements, 0.0, 0.0, 0.0, rate_damping, True)
                 else:
-                    isotropic_elements.push(w, law, number, counts.elements)
+                    isotropic_elements.push(w, *law.of, counts.elements)
+
+    def _decompose(self, w: World, counts: Counts, due: float, *, keep: bool) -> None:
+        """Stretches and axes of the elements with isotropic laws, after what flows over `due` [s] has flowed."""
+        isotropic_elements.decompose(w, counts.elements, ROTATION_ITERATIONS, keep)
+        if due > 0:
+            for law in self._laws:
+                if law.plastic:
+                    flowing_elements.flow(w, *law.of, counts.elements, due)
 
     def settle(self, w: World, counts: Counts, *, due: float) -> None:
         """Keep what flows over the time `due` [s] at the present shape."""
         if self.plastic and due > 0:
-            yielding_elements.settle(w, counts.elements, due, ROTATION_ITERATIONS)
+            yielding_elements.settle(w, counts.elements, due, ROTATION_ITERATIONS, elements.LINEAR)
             if self.springs:
                 spring_elements.settle(w, counts.elements, due)
+            if self._laws:
+                self._decompose(w, counts, due, keep=False)
 
     def show_plastic(self, w: World, counts: Counts, *, due: float) -> None:
         """Plastic strain to `w.stress`, and how much has accumulated to `w.energy`; see `yielding_elements.show`."""
         yielding_elements.show(w, counts.elements, due, ROTATION_ITERATIONS)
         if self.springs:
             spring_elements.show(w, counts.elements, due)
+        if self._laws:
+            self._decompose(w, counts, 0.0, keep=False)
+        for law in self._laws:
+            if law.plastic:
+                flowing_elements.show(w, *law.of, counts.elements, due)
 
     def measure(self, w: World, counts: Counts, *, due: float = 0.0) -> None:
         """Cauchy stress and elastic energy of every element."""
@@ -164,14 +212,18 @@ class Laws:
         if self.springs:
             spring_elements.measure(w, counts.elements, due)
         if self._laws:
-            isotropic_elements.decompose(w, counts.elements, ROTATION_ITERATIONS, False)
-            for number, law in self._laws:
-                isotropic_elements.measure(w, law, number, counts.elements)
+            self._decompose(w, counts, 0.0, keep=False)
+            for law in self._laws:
+                if law.plastic:
+                    flowing_elements.measure(w, *law.of, counts.elements, due)
+                else:
+                    isotropic_elements.measure(w, *law.of, counts.elements)
 
 
 def _key(material: Material) -> tuple:
+    key = (material.model,)
     if material.model == "invertible":
-        return material.wraps, material.threshold
-    if material.model == "corotational" and material.rotation == "qr":
+        key = material.wraps, material.threshold
+    elif material.model == "corotational" and material.rotation == "qr":
         return "corotational", "qr"
-    return (material.model,) if material.plasticity == "none" else (material.model, "plastic")
+    return key if material.plasticity == "none" else (*key, "plastic")

@@ -23,7 +23,7 @@ from taichifem.timing import PhaseTimer
 OF_NODES = ("x", "v", "v0", "past")
 OF_ELEMENTS = ("rotation",)
 PAST = ("past_x", "past_v")
-PLASTIC = ("plastic", "hardened")
+PLASTIC = ("plastic", "hardened", "plastic_inverse")
 SPRINGS = ("spring_growth", "spring_hardened")
 """Fields that the next steps depend on: of all scenes; where an integrator looks back; with plastic materials, and
 springs among them."""

@@ -48,6 +48,7 @@ def _fill_elements(w: ti.template(), indices: _array(), gradients: _array(), vol
         if ti.static(w.capacity.plastic):
             w.plastic[e] = ti.Vector.zero(w.real, 6)
             w.hardened[e] = 0.0
+            w.plastic_inverse[e] = ti.Matrix.identity(w.real, 3)
             if ti.static(w.capacity.springs):
                 w.spring_growth[e] = ti.zero(w.spring_growth[e])
                 w.spring_hardened[e] = ti.zero(w.spring_hardened[e])

@@ -148,7 +148,7 @@ class World:
         self.gradients, self.volume = self._matrix(m, d, d), self._scalar(m)
         self.rotation = self._vector(m, 4)
         k = m if self.capacity.plastic else 1
-        self.plastic, self.hardened = self._vector(k, 6), self._scalar(k)
+        self.plastic, self.hardened, self.plastic_inverse = self._vector(k, 6), self._scalar(k), self._matrix(k, 3, 3)
         self.h, self.corner_force = (self._vector(corners * m, d) for _ in range(2))
         self.moduli = self._vector(m, 2)  # lambda and mu, times the step's factor of K
         self.stress = self._matrix(m, 3, 3)

@@ -1,9 +1,13 @@
-"""Loops over linear and corotational elements with a yield stress, for Newton's method.
+"""Loops over plastic elements with exact tangents: linear and corotational ones for Newton, and St. Venant-Kirchhoff.
 
 The return to the yield surface is inside the iteration here: every look at the forces starts from the plastic strain
 at the start of the step, and the tangent is that of the return. As the return keeps the axes of the strain, stress and
 tangent are told along them, and stored as those of isotropic laws are. How the rotation of an element turns with its
 corners is left out of the tangent, as it is of the fast road.
+
+Green's strain E = (F^T F - I) / 2 follows the same lines, with F in place of the rotation: its plastic part is taken
+off, S = C (E - E_p) follows, and F S are the forces. As F changes with the corners, so does S along: to the tangent
+comes g_a . S g_b for each pair of corners, or its positive part.
 """
 
 from taichifem import elements, plastic_strain
@@ -18,7 +22,12 @@ FIRM = 1e-6
 
 @ti.func
 def _is_here(model):
-    return model == elements.YIELDING or model == elements.YIELDING_LINEAR
+    return model >= elements.YIELDING_LINEAR and model < elements.FIRST_LAW
+
+
+@ti.func
+def _is_additive(model):
+    return model != elements.SPRINGS and model < elements.FIRST_LAW
 
 
 @ti.func
@@ -62,6 +71,7 @@ def respond(
     within: ti.f64,
     most: ti.i32,
     keep: ti.i32,
+    projected: ti.i32,
 ):
     """Corner forces, and the tangent for `isotropic_elements.store_blocks`.
 
@@ -74,7 +84,7 @@ def respond(
             la, mu, kind = row[elements.LAMBDA], row[elements.MU], ti.cast(row[elements.PLASTICITY], ti.i32)
             gradients = w.gradients[e]
             F = elements.edges(w.x, w, e) @ gradients
-            R = elements.rotation_of(w, e, F, most, keep)
+            R = elements.frame_of(w, e, F, most, keep)
             e3, Q = _axes(elements.elastic_strain(F, R, w, e, row, 0.0, 0), w)
             if within == 0:
                 kind = plasticity.NONE
@@ -96,20 +106,21 @@ def respond(
             forces = elements.with_first(-w.volume[e] * (gradients @ P.transpose()))
             elements.hand_out(forces, w.corner_force, w, e)
             own, extra = ti.cast(stiffness_factor, w.real), ti.cast(damping_factor, w.real) * beta
-            w.svd_u[e], w.svd_v[e] = R @ Q, Q
+            w.svd_u[e], w.svd_v[e], w.stretch[e] = R @ Q, Q, own * (ti.max(s, 0.0) if projected else s)
             w.tangent_a[e] = own * A + extra * elastic
             w.tangent_p[e] = own * p + extra * mu
             w.tangent_q[e] = own * p + extra * mu
 
 
 @ti.kernel
-def settle(w: ti.template(), n_elements: ti.i32, due: ti.f64, most: ti.i32):
-    """What flows over `due` [s] at the present shape becomes plastic strain, in all elements that can."""
+def settle(w: ti.template(), n_elements: ti.i32, due: ti.f64, most: ti.i32, from_model: ti.i32):
+    """What flows over `due` [s] at the present shape becomes plastic strain, where MODEL is `from_model` or above."""
     for e in range(n_elements):
         row = w.table[w.material[e]]
-        if row[elements.PLASTICITY] > 0 and row[elements.MODEL] != elements.SPRINGS:
+        flows = row[elements.PLASTICITY] > 0 and row[elements.MODEL] >= from_model
+        if flows and _is_additive(row[elements.MODEL]):
             F = elements.edges(w.x, w, e) @ w.gradients[e]
-            R = elements.rotation_of(w, e, F, most, 0)
+            R = elements.frame_of(w, e, F, most, 0)
             elements.elastic_strain(F, R, w, e, row, due, 1)
 
 
@@ -119,9 +130,9 @@ def show(w: ti.template(), n_elements: ti.i32, due: ti.f64, most: ti.i32):
     for e in range(n_elements):
         row = w.table[w.material[e]]
         w.stress[e], w.energy[e] = ti.Matrix.zero(w.real, 3, 3), 0.0
-        if row[elements.PLASTICITY] > 0 and row[elements.MODEL] != elements.SPRINGS:
+        if row[elements.PLASTICITY] > 0 and _is_additive(row[elements.MODEL]):
             F = elements.edges(w.x, w, e) @ w.gradients[e]
-            R = elements.rotation_of(w, e, F, most, 0)
+            R = elements.frame_of(w, e, F, most, 0)
             strain = elements.elastic_strain(F, R, w, e, row, 0.0, 0)
             w.stress[e], w.energy[e] = plastic_strain.kept(w, e), w.hardened[e]
             if due > 0:

@@ -1,9 +1,15 @@
-"""A few of the random scenes; `python tests/random_scenes.py` runs a hundred."""
+"""A few of the random scenes; `python tests/random_scenes.py` and `python tests/violent_scenes.py` run more."""
 
 import pytest
 import random_scenes
+import violent_scenes
 
 
 @pytest.mark.parametrize("seed", range(6))
 def test_random_scene(seed):
     random_scenes.run(seed)
+
+
+@pytest.mark.parametrize("seed", [9, 21, *(pytest.param(seed, marks=pytest.mark.slow) for seed in range(10, 20))])
+def test_violent_scene_with_plasticity(seed):
+    violent_scenes.run(seed)

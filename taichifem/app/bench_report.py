@@ -14,6 +14,9 @@ def print_report(*, rows: list[dict], peers: list[dict], growth: list[dict]) -> 
     screen.print("Time per step: median (10th to 90th percentile) [ms], of which in each phase", _steps(rows), sep="\n")
     for line in growth:
         screen.print(_growth(line))
+    for row in rows:
+        if "elastic_ms" in row:
+            screen.print(_plastic(row))
     screen.print("\nStart, memory, result", _start(rows), sep="\n")
     screen.print(
         "\nThe matrix product alone, against a plain read of the matrix by the same threads (best of a few)",
@@ -75,6 +78,14 @@ def _growth(line: dict) -> str:
     return (
         f"E = {line['youngs']:g} Pa, {line['solver']}: the time grows with the number of tetrahedra to the power "
         f"{line['exponent']:.2f} (from {tets[0]:,} to {tets[-1]:,}{small})"
+    )
+
+
+def _plastic(row: dict) -> str:
+    ours, elastic = row["ms"]["median"], row["elastic_ms"]["median"]
+    return (
+        f"{row['tets']:,} tets, E = {row['youngs']:g} Pa: {row['plasticity']} takes {ours / elastic:.2f} times the "
+        f"{told(row['elastic_ms'])} ms of the elastic bar beside it; {row['yielded']:.0%} of the elements have yielded"
     )
 
 

@@ -10,9 +10,9 @@ import json
 import statistics
 import sys
 import time
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
-from taichifem.app.peers.common import FPS, drive, peak_mib, spread
+from taichifem.app.peers.common import FPS, drive, peak_mib, spread, timed_ms
 from taichifem.errors import InputError
 
 LENGTH, SIDE = 1.0, 0.25  # [m]
@@ -23,13 +23,16 @@ DENSITY, GRAVITY = 1000.0, 9.81
 class Bar:
     """What to measure: a bar of 4m x m x m cubes, 20 m^3 tetrahedra, held at x = 0 and released at rest.
 
-    youngs: [Pa].  steps: timed ones, at most; they end after `budget` seconds.  0 steps: only the start.
+    youngs: [Pa].  plasticity: law of a bar that yields at half of the stress which its weight gives its root; an
+    elastic twin then runs in turn with it.
+    steps: timed ones, at most; they end after `budget` seconds.  0 steps: only the start.
     """
 
     m: int
     youngs: float = 1e6
     poisson: float = 0.4
     model: str = "corotational"
+    plasticity: str = "none"
     solver: str = "multilevel"
     precision: str = "f32"
     arch: str | None = None
@@ -55,14 +58,15 @@ def measure(bar: Bar) -> dict:
     mesh = bar_mesh(bar.m)
     simulation, setup = _set_up(bar, mesh)
     figures = {"nodes": len(mesh.points), "tets": len(mesh.cells), "taichi_s": started - begin, "setup_s": setup}
-    figures |= _steps(simulation, mesh.points[:, 0] > LENGTH - 1e-9, bar)
+    twin = _set_up(replace(bar, plasticity="none"), mesh)[0] if bar.plasticity != "none" else None
+    figures |= _steps(simulation, mesh.points[:, 0] > LENGTH - 1e-9, bar, twin)
     return figures | {"timoshenko_m": -timoshenko(bar.youngs, bar.poisson), "peak_mib": peak_mib()}
 
 
 def _set_up(bar: Bar, mesh) -> tuple:
     from taichifem import Body, BoxRegion, Material, Scene, Simulation
 
-    material = Material(model=bar.model, youngs=bar.youngs, poisson=bar.poisson, density=DENSITY)
+    material = Material(model=bar.model, youngs=bar.youngs, poisson=bar.poisson, density=DENSITY, **_flow(bar))
     held = BoxRegion(lower=(-1.0, -1.0, -1.0), upper=(1e-6, 1.0, 1.0))
     body = Body(mesh=mesh, material=material, pins=[held])
     scene = Scene(bodies=[body], gravity=(0.0, 0.0, -GRAVITY), fps=FPS, solver=bar.solver)
@@ -71,11 +75,22 @@ def _set_up(bar: Bar, mesh) -> tuple:
     return simulation, time.perf_counter() - begin
 
 
-def _steps(simulation, tip, bar: Bar) -> dict:
-    """What the steps took, and what each of them tells about itself."""
-    phases, reports = {}, []
+def _flow(bar: Bar) -> dict:
+    limit = 1.5 * DENSITY * GRAVITY * LENGTH**2 / SIDE
+    if bar.plasticity == "creep":
+        return {"plasticity": "creep", "yield_strain": limit / bar.youngs, "creep_rate": 10.0}
+    if bar.plasticity != "none":
+        return {"plasticity": bar.plasticity, "yield_stress": limit, "hardening": bar.youngs / 20}
+    return {}
+
+
+def _steps(simulation, tip, bar: Bar, twin) -> dict:
+    """What the steps took, and what each of them tells about itself; and what those of its elastic twin took."""
+    phases, reports, elastic = {}, [], []
 
     def note() -> None:
+        if twin is not None:
+            elastic.append(timed_ms(twin.step))
         # The timer and the report themselves: `simulation.stats` also computes stresses, which warms caches up.
         for name, ms in simulation.phases.items():
             phases.setdefault(name, []).append(ms)
@@ -88,6 +103,10 @@ def _steps(simulation, tip, bar: Bar) -> dict:
     if not bar.steps:
         return figures
     iterations = [report.iterations for report in reports]
+    if twin is not None:
+        # The first step of the twin compiles, and is no sooner than the first timed one of the bar.
+        flowed = simulation.equivalent_plastic_strain()
+        figures |= {"elastic_ms": spread(elastic[1:]), "yielded": float((flowed > 0).mean())}
     return figures | {
         "phases_ms": {name: spread(values) for name, values in phases.items()},
         "real_time_factor": 1e3 / FPS / figures["ms"]["median"],

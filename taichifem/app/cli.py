@@ -8,7 +8,15 @@ from typing import Any
 import click
 
 from taichifem import __version__
-from taichifem.app.options import FILE, MODELS, compare_options, machine_options, run_options, static_options
+from taichifem.app.options import (
+    FILE,
+    MODELS,
+    PLASTICITIES,
+    compare_options,
+    machine_options,
+    run_options,
+    static_options,
+)
 from taichifem.app.program import INTERRUPTED, UNSOLVED, Program
 
 EXAMPLES = """
@@ -186,6 +194,13 @@ def info() -> None:
 @click.option("--stiffness", default="1e6", show_default=True, help="Young's moduli [Pa], separated by commas.")
 @click.option("--poisson", type=float, default=0.4, show_default=True, help="Poisson's ratio.")
 @click.option("--model", type=click.Choice(MODELS), default="corotational", show_default=True, help="Of the material.")
+@click.option(
+    "--plasticity",
+    type=click.Choice(PLASTICITIES),
+    default="none",
+    show_default=True,
+    help="Of a bar that yields; an elastic twin runs in turn with it.",
+)
 @click.option("--solver", default="multilevel", show_default=True, help="Linear solvers: multilevel,block-jacobi.")
 @click.option("--steps", type=click.IntRange(min=1), default=60, show_default=True, help="Timed steps, at most.")
 @click.option("--budget", type=float, default=45.0, show_default=True, help="Seconds for them, at most.")
@@ -219,6 +234,7 @@ def bench(**options: Any) -> None:
     Examples:
       taichifem bench --sizes 1k,5k --no-cold
       taichifem bench --stiffness 1e5,1e6,1e7 --json bench.json
+      taichifem bench --sizes 20k --plasticity von-mises
       taichifem bench --sizes 1k,5k,20k,100k,1m --plot bench.png     needs: pip install "taichifem[plot]"
       taichifem bench --sizes 5k --against mujoco,newton --peer-python newton=~/newton/bin/python
     """

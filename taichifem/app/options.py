@@ -13,6 +13,7 @@ import click
 ARCHES = ("cpu", "cuda", "vulkan", "metal")
 PRECISIONS = ("f32", "f64")
 MODELS = ("mass-spring", "linear", "corotational", "stvk", "neo-hookean", "invertible")
+PLASTICITIES = ("none", "creep", "von-mises", "tresca")
 RENDERERS = ("auto", "taichi", "ggui", "pyvista")
 COLORS = ("material", "von-mises", "plastic-strain", "displacement", "speed")
 EXPORTS = ("vtu", "ply", "obj", "npz")

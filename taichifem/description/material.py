@@ -19,9 +19,6 @@ YIELD_KEYS = ("yield_stress", "hardening", "viscosity")
 ELASTIC = dict.fromkeys((*CREEP_KEYS, *YIELD_KEYS, "compression_limit")) | {"plasticity": "none"}
 """Changes that take a material's plasticity away."""
 
-PLASTIC = ("mass-spring", "linear", "corotational")
-"""Models that can be plastic."""
-
 
 @dataclass(frozen=True, kw_only=True)
 class Material:
@@ -38,11 +35,13 @@ class Material:
     density: [kg/m^3], above 0.
     mass_damping: Rayleigh alpha [1/s], slows every motion.  stiffness_damping: Rayleigh beta [s], slows
     deformation only.
-    plasticity: what stays when the load is gone, of "linear", "corotational" and "mass-spring" materials. "none";
+    plasticity: what stays when the load is gone: a part of the strain (of "stvk", Green's); of "neo-hookean" and
+    "invertible" F_p of F = F_e F_p, with det F_p = 1. "none";
     "creep" (Mueller & Gross 2004): of an elastic strain larger than `yield_strain`, the part `creep_rate` [1/s] times
     dt in every step, until `max_plastic_strain` (None: no end) is reached, strains being measured by their Frobenius
     norm; "von-mises" and "tresca": strain beyond `yield_stress` [Pa], which grows by `hardening` [Pa] times the plastic
-    strain and is overstepped by `viscosity` [Pa s] times its rate. Springs yield one by one, in pressure at
+    strain and is overstepped by `viscosity` [Pa s] times its rate (Kirchhoff stress where F_p is kept, second
+    Piola-Kirchhoff stress of "stvk"). There creep leaves the volume alone. Springs yield one by one, in pressure at
     `compression_limit` in place of the first limit, if it is given.
     Raises InputError for values outside these bounds.
     """
@@ -84,11 +83,6 @@ class Material:
 
     def _check_plasticity(self) -> None:
         check.choice("plasticity", self.plasticity, PLASTICITIES)
-        if self.plasticity != "none" and self.model not in PLASTIC:
-            raise InputError(
-                f"plasticity {self.plasticity!r} does not go with the model {self.model!r}: "
-                f"choose one of {', '.join(map(repr, PLASTIC))}"
-            )
         if self.compression_limit is not None:
             check.number("compression_limit", self.compression_limit, above=0)
             if self.model != "mass-spring" or self.plasticity == "none":

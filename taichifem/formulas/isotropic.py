@@ -65,7 +65,12 @@ def tangent(model: ti.template(), s, la, mu):
     The same holds where two stretches nearly cancel, if the law is even; if not, the true value grows without
     bound, and the quotient is bounded instead.
     """
-    slope, A = model.slope(s, la, mu), model.curvature(s, la, mu)
+    return tangent_of(model.slope(s, la, mu), model.curvature(s, la, mu), s, model.EVEN)
+
+
+@ti.func
+def tangent_of(slope, A, s, even: ti.template()):
+    """The same from the first derivatives (d,) and A (d,d) of any function of the stretches s (d,)."""
     stretch = ti.Vector(
         [
             _quotient(slope[i] - slope[j], s[i] - s[j], 0.5 * (A[i, i] + A[j, j]) - A[i, j])
@@ -75,7 +80,7 @@ def tangent(model: ti.template(), s, la, mu):
     twist = ti.Vector(
         [
             _quotient(slope[i] + slope[j], s[i] + s[j], 0.5 * (A[i, i] + A[j, j]) + A[i, j])
-            if ti.static(model.EVEN)
+            if ti.static(even)
             else (slope[i] + slope[j]) / ti.max(s[i] + s[j], CANCELLED)
             for i, j in ti.static(PAIRS[s.n])
         ]

@@ -60,7 +60,7 @@ def without_mean(values):
 
 
 @ti.func
-def _ranks(e):
+def ranks(e):
     """Where the largest, the middle and the smallest of three values stand: three unit vectors."""
     x, y, z = e[0], e[1], e[2]
     top, low = ti.Vector([0.0, 0.0, 1.0]), ti.Vector([0.0, 0.0, 1.0])
@@ -81,7 +81,7 @@ def _tresca(e, alpha, mu, limit, slope, viscosity, dt):
 
     They are (1, 0, -1) in the order of the stresses, and at a corner (1, -1, 0) or (0, 1, -1) too; else b is a.
     """
-    top, middle, low = _ranks(e)
+    top, middle, low = ranks(e)
     high, mean, least = e.dot(top), e.dot(middle), e.dot(low)
     h = slope + viscosity / dt
     yield_now = limit + slope * alpha

@@ -3,7 +3,9 @@
 Real materials scatter: the sources give ranges and the presets take a round value inside. Two simplifications
 are made throughout: materials are isotropic, and Poisson's ratio of the nearly incompressible ones (0.49 and
 more) is lowered to 0.45 or 0.47, since linear tetrahedra lock beyond. None has damping: real loss depends on
-frequency in ways that Rayleigh damping does not follow, so a scene states its own.
+frequency in ways that Rayleigh damping does not follow, so a scene states its own. Metals that yield harden along
+the straight line from the yield stress to the strength at the strain of rupture. Where a number is only an order of
+magnitude, the source says so.
 """
 
 from __future__ import annotations
@@ -64,7 +66,54 @@ PRESETS: dict[str, Preset] = {
     ),
     "steel": Preset(
         Material(youngs=2.1e11, poisson=0.29, density=7850.0),
-        f"low carbon steel; {_ASHBY}: 200 to 215 GPa, 7800 to 7900 kg/m^3",
+        f"low carbon steel, elastic; {_ASHBY}: 200 to 215 GPa, 7800 to 7900 kg/m^3",
+    ),
+    "mild-steel": Preset(
+        Material(youngs=2.1e11, poisson=0.29, density=7850.0, plasticity="von-mises", yield_stress=3e8, hardening=5e8),
+        f"low carbon steel; {_ASHBY}: yields at 250 to 395 MPa, holds 345 to 580 MPa, 26 to 47% elongation",
+    ),
+    "lead": Preset(
+        Material(
+            youngs=1.4e10, poisson=0.44, density=11300.0, plasticity="von-mises", yield_stress=1.1e7, hardening=6e6
+        ),
+        f"{_ASHBY}: 12.5 to 15 GPa, yields at 8 to 14 MPa; Callister: 14 GPa, 11 MPa, holds 14 MPa, strain 0.5",
+    ),
+    "clay": Preset(
+        Material(
+            model="neo-hookean",
+            youngs=5e6,
+            poisson=0.45,
+            density=1800.0,
+            plasticity="von-mises",
+            yield_stress=4e4,
+        ),
+        "soft wet clay, quickly loaded; Bowles, Foundation Analysis and Design: 2 to 25 MPa; Terzaghi & Peck: "
+        "unconfined strength 25 to 50 kPa",
+    ),
+    "wax": Preset(
+        Material(
+            model="neo-hookean",
+            youngs=1e8,
+            poisson=0.4,
+            density=900.0,
+            plasticity="von-mises",
+            yield_stress=1e6,
+        ),
+        "paraffin at room temperature, orders of magnitude: both fall steeply with temperature (Seyer & Inouye 1935, "
+        "Ind. Eng. Chem. 27)",
+    ),
+    "dough": Preset(
+        Material(
+            model="neo-hookean",
+            youngs=3e4,
+            poisson=0.45,
+            density=1200.0,
+            plasticity="creep",
+            yield_strain=0.01,
+            creep_rate=3.0,
+        ),
+        "wheat dough; Phan-Thien & Safari-Ardi 1998, J. Non-Newtonian Fluid Mech. 74: shear modulus some 10 kPa; it "
+        "flows beyond strains of 0.001, fast and slow: one rate, and a strain at which it stands, are chosen by eye",
     ),
 }
 

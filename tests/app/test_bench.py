@@ -52,6 +52,16 @@ def test_figures_of_a_small_bar(tmp_path):
     assert "to the power" not in result.output and "other programs" not in result.output
 
 
+def test_a_bar_that_yields_runs_beside_an_elastic_one(tmp_path):
+    target = tmp_path / "bench.json"
+    options = ("--steps", 20, "--plasticity", "von-mises", "--no-cold", "--json", target)
+    result = call("bench", "--sizes", "160", *options)
+    assert result.exit_code == 0, result.output
+    (row,) = json.loads(target.read_text())["rows"]
+    assert row["plasticity"] == "von-mises" and 0 < row["yielded"] < 1 and row["elastic_ms"]["median"] > 0
+    assert "von-mises takes" in result.output
+
+
 def test_a_cold_start_of_each_solver_is_measured_in_an_empty_cache(monkeypatch):
     seen = []
 

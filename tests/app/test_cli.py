@@ -46,6 +46,7 @@ def test_the_lists_of_choices_are_those_of_the_packages():
     assert options.ARCHES == runtime.ARCHES
     assert set(options.PRECISIONS) == set(runtime.PRECISIONS)
     assert options.MODELS == material.MODELS
+    assert options.PLASTICITIES == material.PLASTICITIES
     assert options.RENDERERS == view.RENDERERS
     assert options.COLORS == view.COLORS
     assert set(options.EXPORTS) == set(export.FORMATS)
