@@ -116,11 +116,26 @@ def _gather_level(w: ti.template(), n: ti.i32, level: ti.i32, first: ti.i32, end
 
 
 @ti.func
+def _size(w: ti.template(), M):
+    """The largest entry on the diagonal; 1 if there is none."""
+    largest = ti.max(M[0, 0], M[1, 1], M[2, 2])
+    return largest if largest > 0 else ti.cast(1.0, w.real)
+
+
+@ti.func
 def _firm(w: ti.template(), M):
     """M with a diagonal that can be inverted: motions that no node can follow (all pinned, or in a line) have none."""
+    least = ti.cast(1e-6, w.real) * _size(w, M)
     for a in ti.static(range(3)):
-        M[a, a] = ti.max(M[a, a] * (1 + ti.cast(1e-4, w.real)), 1e-30)
+        M[a, a] = ti.max(M[a, a] * (1 + ti.cast(1e-4, w.real)), least)
     return M
+
+
+@ti.func
+def _inverse(w: ti.template(), M):
+    """Of entries of any size: unscaled, determinants of the small ones would be zero in single precision."""
+    size = _size(w, M)
+    return (M / size).inverse() / size
 
 
 @ti.func
@@ -128,10 +143,10 @@ def _invert_own(w: ti.template(), n: ti.i32, g: ti.i32):
     """The inverse of an aggregate's own matrix [[A, B], [B^T, D]], by Schur's complement of A."""
     k = w.own_block[g]
     width = w.row_start[n + 2 * g + 1] - w.row_start[n + 2 * g]
-    inverse = _firm(w, w.block[k]).inverse()
+    inverse = _inverse(w, _firm(w, w.block[k]))
     B = w.block[k + 1]
     half = inverse @ B
-    rest = (_firm(w, w.block[k + width + 1]) - B.transpose() @ half).inverse()
+    rest = _inverse(w, _firm(w, w.block[k + width + 1]) - B.transpose() @ half)
     across = half @ rest
     w.own_inverse[4 * g] = inverse + across @ half.transpose()
     w.own_inverse[4 * g + 1] = -across

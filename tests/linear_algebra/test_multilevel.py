@@ -143,3 +143,21 @@ def test_the_product_is_timed_and_leaves_no_trace():
     for simulation in simulations:
         simulation.step()
     assert np.array_equal(*(simulation.positions for simulation in simulations))
+
+
+@pytest.mark.parametrize("axes", ["yz", "z", "xyz"])
+def test_pins_may_take_motions_from_whole_aggregates(axes):
+    """Guided sideways, or held altogether, nodes leave coarse motions that nothing can follow."""
+    everywhere = tf.BoxRegion(lower=(-9, -9, -9), upper=(9, 9, 9))
+    half = tf.BoxRegion(lower=(-9, -9, -9), upper=(0.5, 9, 9))
+    guided = bar(pins=[tf.Pin(region=half if axes == "xyz" else everywhere, axes=axes)], velocity=(1.0, 0.0, 0.0))
+    simulation = tf.Simulation(tf.Scene(bodies=[guided]))
+    simulation.advance(seconds=0.1)
+    assert simulation.report.converged
+    moved = simulation.positions - simulation.rest_positions
+    if axes == "xyz":
+        free = simulation.rest_positions[:, 0] > 0.5
+        assert moved[free][:, 2].min() < -1e-3 and abs(moved[~free]).max() < 1e-6
+    else:
+        assert moved[:, 0].mean() == pytest.approx(0.1, abs=0.02)
+        assert abs(moved[:, 2]).max() < 1e-6
