@@ -11,7 +11,7 @@ __version__ = "0.1.0"
 
 _HOME = {
     "taichifem.description": (
-        "Body BoxCollider BoxRegion Camera Force Handle IndexRegion Material Motion NearestRegion Pin "
+        "Body BoxCollider BoxRegion Camera Force Fracture Handle IndexRegion Material Motion NearestRegion Pin "
         "PlaneCollider Pressure Scene SphereCollider SphereRegion Traction View"
     ),
     "taichifem.errors": "Diverged InputError",

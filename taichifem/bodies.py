@@ -21,10 +21,11 @@ from taichifem.linear_algebra.galerkin import Galerkin
 from taichifem.linear_algebra.program import write_program
 from taichifem.linear_algebra.spectrum import highest_frequency
 from taichifem.processes.loading import Loading
+from taichifem.room import room_for
 from taichifem.structure.levels import Levels, stack_levels
 from taichifem.structure.pattern import BlockPattern, block_pattern, to_sparse
 from taichifem.surroundings import Surroundings, pose
-from taichifem.world import Capacity, Counts, World, acquire
+from taichifem.world import Counts, World, acquire
 
 
 class Bodies:
@@ -39,54 +40,37 @@ class Bodies:
         runtime.start(arch=arch, threads=threads)
         self.scene = scene
         self.precision = precision
-        self._layout: Layout = lay_out(scene)
-        self._pattern: BlockPattern = block_pattern(self._layout.cells, len(self._layout.rest))
-        self._materials = list(self._layout.materials)
+        layout = lay_out(scene)
+        self._whole = layout
+        self._materials = list(layout.materials)
         self._laws = Laws(self._materials, exact=scene.integrator in EXACT)
-        self._loading = Loading(self._layout)
-        self._levels: Levels = stack_levels(self._pattern, self._layout.aggregates)
-        self._galerkin = Galerkin(self._layout.aggregates, self._levels) if scene.solver == "multilevel" else None
-        self._program = write_program(self._pattern, self._layout.aggregates, solver=scene.solver)
+        self._take(layout)
         self._generation = runtime.generation
-        self._world: World = acquire(self._capacity(), precision, self)
-        self._counts = Counts(
-            nodes=len(self._layout.rest),
-            elements=len(self._layout.cells),
-            pairs=self._pattern.n_pairs,
-            pieces=self._pattern.pieces,
-            bodies=len(scene.bodies),
-            colliders=len(scene.colliders),
-        )
-        with self._kernels():
-            transfer.fill(self._world, self._layout, self._pattern)
-            transfer.fill_levels(self._world, self._pattern, self._levels, self._layout.aggregates, self._program)
-        self._surroundings = Surroundings(scene, self._layout, self._world, self._counts)
+        room = room_for(scene, layout, self._laws, pattern=self._pattern, levels=self._levels, program=self._program)
+        self._world: World = acquire(room, precision, self)
+        self._counts = Counts(bodies=len(scene.bodies), colliders=len(scene.colliders))
+        self._fill()
         self._gravity = np.asarray(scene.gravity, dtype=float)
         self._due = 0.0  # time over which plastic flow is due: it is made up for when the next step begins [s]
 
-    def _capacity(self) -> Capacity:
+    def _take(self, layout: Layout) -> None:
+        """Take a layout, and work out all that follows from its mesh."""
+        self._layout = layout
+        self._pattern: BlockPattern = block_pattern(layout.cells, len(layout.rest))
+        self._loading = Loading(layout)
+        self._levels: Levels = stack_levels(self._pattern, layout.aggregates)
+        self._galerkin = Galerkin(layout.aggregates, self._levels) if self.scene.solver == "multilevel" else None
+        self._program = write_program(self._pattern, layout.aggregates, solver=self.scene.solver)
+
+    def _fill(self) -> None:
+        """Fill the world with it, at rest."""
         layout, pattern = self._layout, self._pattern
-        return Capacity(
-            nodes=len(layout.rest),
-            elements=len(layout.cells),
-            blocks=pattern.n_blocks,
-            pairs=pattern.n_pairs,
-            materials=len(layout.materials),
-            colliders=len(self.scene.colliders),
-            held=1 + sum(len(g.nodes) for g in layout.pins),
-            pulled=1 + sum(len(g.nodes) for g in layout.handles),
-            poses=len(layout.pins) + len(layout.handles),
-            bodies=len(self.scene.bodies),
-            aggregates=layout.aggregates.count,
-            coarse_blocks=len(self._levels.column) - pattern.n_blocks,
-            coarse_pairs=len(self._levels.pair),
-            members=len(self._levels.member),
-            operations=len(self._program),
-            dimension=layout.dimension,
-            tangents=self._laws.stores_tangents,
-            springs=self._laws.springs,
-            plastic=self._laws.plastic,
-        )
+        self._counts.nodes, self._counts.elements = len(layout.rest), len(layout.cells)
+        self._counts.pairs, self._counts.pieces = pattern.n_pairs, pattern.pieces
+        with self._kernels():
+            transfer.fill(self._world, layout, pattern)
+            transfer.fill_levels(self._world, pattern, self._levels, layout.aggregates, self._program)
+        self._surroundings = Surroundings(self.scene, layout, self._world, self._counts)
 
     def _kernels(self):
         """Around every use of the fields: the right precision, and fields that still exist."""

@@ -15,7 +15,7 @@ from taichifem.errors import InputError
 from taichifem.files import replacing
 
 FORMAT = "taichifem-checkpoint"
-VERSION = 4
+VERSION = 5
 
 
 def fingerprint(*arrays: np.ndarray, text: str = "") -> str:

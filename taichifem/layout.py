@@ -51,7 +51,7 @@ class Layout:
     dimension d: 3 for tetrahedra, 2 for triangles in the plane y = 0.
     rest (n,3) [m], velocities (n,3) [m/s], cells (m,d+1), thickness (m,) [m] (1 in space), node_bodies (n,),
     cell_bodies (m,), cell_materials (m,) into `materials`, regions (m,), surface (k,3) triangles to draw, outward,
-    surface_bodies (k,), body_start (bodies+1,).
+    surface_bodies (k,), cracked (k,): faces that fracture opened, body_start (bodies+1,).
 
     Nodes are numbered such that those of an aggregate of the solver follow one another, and elements after their
     nodes: what is used together lies together. node_order (n,), cell_order (m,): the numbers they had in the scene.
@@ -68,6 +68,7 @@ class Layout:
     regions: np.ndarray
     surface: np.ndarray
     surface_bodies: np.ndarray
+    cracked: np.ndarray
     body_start: np.ndarray
     materials: list[Material]
     material_of: dict[tuple[int, int | None], int]
@@ -206,6 +207,7 @@ def lay_out(scene: Scene) -> Layout:
         regions=np.concatenate(regions)[elements],
         surface=number[np.concatenate(surface)],
         surface_bodies=np.concatenate(surface_bodies),
+        cracked=np.zeros(sum(map(len, surface)), dtype=bool),
         body_start=np.asarray(body_start, dtype=np.int32),
         materials=materials,
         material_of=material_of,

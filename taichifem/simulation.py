@@ -10,30 +10,22 @@ from dataclasses import asdict
 import numpy as np
 
 from taichifem import checkpoint, transfer
-from taichifem.bodies import Bodies
+from taichifem.breaking import BreakingBodies
 from taichifem.clock import Clock
 from taichifem.description import Collider, Load, Material, Scene
 from taichifem.errors import Diverged, InputError
-from taichifem.integrators import ADVANCE, HISTORY, implicit, symplectic_euler
+from taichifem.integrators import ADVANCE, implicit, symplectic_euler
 from taichifem.integrators.step import Options, Step, StepReport
+from taichifem.state import element_fields, node_fields
 from taichifem.stats import Stats, figures
 from taichifem.supports import check_supports
 from taichifem.timing import PhaseTimer
-
-OF_NODES = ("x", "v", "v0", "past")
-OF_ELEMENTS = ("rotation",)
-PAST = ("past_x", "past_v")
-PLASTIC = ("plastic", "hardened", "plastic_inverse")
-SPRINGS = ("spring_growth", "spring_hardened")
-"""Fields that the next steps depend on: of all scenes; where an integrator looks back; with plastic materials, and
-springs among them."""
-
 
 STATIC_TOLERANCE, STATIC_ITERATIONS = 1e-6, 50_000
 """Of the linear solver in a static solve: the stiffness matrix alone is far worse conditioned than a step's."""
 
 
-class Simulation(Bodies):
+class Simulation(BreakingBodies):
     """The state of a scene over time. Arrays in and out are NumPy, float64, SI units; z points up.
 
     precision: "f32" (real time) or "f64".  arch, threads: as `taichifem.runtime.start`; None keeps what runs.
@@ -106,6 +98,11 @@ class Simulation(Bodies):
         self._advance()
         self._clock.tick()
         self._fresh = False
+        if self._may_break:
+            with self._timer.phase("fracture"):
+                if self._break(self._clock.steps):
+                    self._surround(self.time, self.dt)
+                    self._loaded, self._fresh, self._restiffened = None, True, True
 
     def _advance(self, **options: object) -> None:
         """One step of the scene's integrator under what the world holds; `options` replace those of the scene."""
@@ -242,6 +239,8 @@ class Simulation(Bodies):
         for one too stiff for the explicit steps that the scene asks for.
         """
         row = self._row(body, region)
+        if material.fracture and not self._may_break:
+            raise InputError("no material of the scene breaks yet: make a new simulation for that")
         before = self._materials[row]
         self._change_material(row, material)
         if self._explicit:
@@ -288,7 +287,7 @@ class Simulation(Bodies):
     # Checkpoints
 
     def _fingerprint(self) -> str:
-        layout = self._layout
+        layout = self._whole
         return checkpoint.fingerprint(
             layout.rest,
             layout.cells,
@@ -302,6 +301,7 @@ class Simulation(Bodies):
         with self._kernels():
             arrays = {name: transfer.read(w, getattr(w, name), count) for name, count in self._state().items()}
             arrays |= transfer.read_contacts(w, self._counts.colliders, self._counts.nodes)
+        arrays |= {"cells": self.cells, "origins": self.origins, "tips": self._tips}
         header = {"scene": self._fingerprint(), "clock": asdict(self._clock), "fresh": self._fresh, "due": self._due}
         checkpoint.write(path, arrays, header)
 
@@ -316,18 +316,17 @@ class Simulation(Bodies):
         if header.get("scene") != self._fingerprint() or clock.fps != self.scene.fps or not same_steps:
             raise InputError(f"{path}: the checkpoint belongs to another scene, time step or precision")
         w = self._world
+        self._become(arrays["cells"], arrays["origins"])
+        self._tips = arrays["tips"]
         with self._kernels():
             for name in self._state():
                 transfer.write(w, getattr(w, name), arrays[name])
             transfer.write_contacts(w, arrays)
         self._clock, self._fresh, self._due = clock, bool(header["fresh"]), float(header["due"])
-        self._surroundings.forget()
         self._surround(self.time, self.dt)
         self._stats = self._loaded = None
 
     def _state(self) -> dict[str, int]:
         """Fields that go into a checkpoint, and how many entries of each."""
-        of_nodes = OF_NODES + (PAST if self.scene.integrator in HISTORY else ())
-        of_elements = OF_ELEMENTS + (PLASTIC if self._laws.plastic else ())
-        of_elements += SPRINGS if self._laws.plastic and self._laws.springs else ()
-        return dict.fromkeys(of_nodes, self._counts.nodes) | dict.fromkeys(of_elements, self._counts.elements)
+        of_nodes = dict.fromkeys(node_fields(self.scene), self._counts.nodes)
+        return of_nodes | dict.fromkeys(element_fields(self._laws), self._counts.elements)

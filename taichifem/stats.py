@@ -18,6 +18,7 @@ class Stats:
     energy: kinetic, elastic, gravity (zero at the origin) and their total [J].
     momentum [kg m/s]; angular_momentum about the origin [kg m^2/s].
     residual: of the last linear solve, relative; converged: False if the iteration cap was hit.
+    pieces: sets of elements that hang together; splits: vertices split in the step; more_splits: the cap was hit.
     linearisations: matrices set up; balanced: False if Newton's method hit its cap.
     """
 
@@ -35,6 +36,9 @@ class Stats:
     linearisations: int = 0
     balanced: bool = True
     contacts: int = 0
+    pieces: int = 0
+    splits: int = 0
+    more_splits: bool = False
     energy: dict[str, float] = field(default_factory=dict)
     momentum: tuple[float, float, float] = (0.0, 0.0, 0.0)
     angular_momentum: tuple[float, float, float] = (0.0, 0.0, 0.0)
@@ -70,6 +74,9 @@ def figures(simulation: Simulation) -> Stats:
         ms_per_step=round(sum(ms.values()), 4),
         **{name: value for name, value in asdict(simulation.report).items() if name != "history"},
         contacts=simulation.contacts,
+        pieces=simulation.piece_count,
+        splits=simulation.splits,
+        more_splits=simulation.more_splits,
         energy={"kinetic": kinetic, "elastic": elastic, "gravity": gravity, "total": kinetic + elastic + gravity},
         momentum=tuple((m * v).sum(axis=0).tolist()),
         angular_momentum=tuple((m * np.cross(x, v)).sum(axis=0).tolist()),

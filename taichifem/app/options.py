@@ -15,7 +15,7 @@ PRECISIONS = ("f32", "f64")
 MODELS = ("mass-spring", "linear", "corotational", "stvk", "neo-hookean", "invertible")
 PLASTICITIES = ("none", "creep", "von-mises", "tresca")
 RENDERERS = ("auto", "taichi", "ggui", "pyvista")
-COLORS = ("material", "von-mises", "plastic-strain", "displacement", "speed")
+COLORS = ("material", "piece", "von-mises", "plastic-strain", "displacement", "speed")
 EXPORTS = ("vtu", "ply", "obj", "npz")
 
 FILE = click.Path(dir_okay=False, path_type=Path)

@@ -1,6 +1,7 @@
 """What a person says: dataclasses with units and checks, no Taichi."""
 
 from taichifem.description.colliders import BoxCollider, Collider, PlaneCollider, SphereCollider
+from taichifem.description.fracture import Fracture
 from taichifem.description.loads import Force, Load, Pressure, Traction
 from taichifem.description.material import Material
 from taichifem.description.motion import Motion
@@ -15,6 +16,7 @@ __all__ = [
     "Camera",
     "Collider",
     "Force",
+    "Fracture",
     "Handle",
     "IndexRegion",
     "Load",

@@ -5,6 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 from taichifem.description import check
+from taichifem.description.fracture import Fracture
 from taichifem.errors import InputError
 
 MODELS = ("mass-spring", "linear", "corotational", "stvk", "neo-hookean", "invertible")
@@ -43,6 +44,7 @@ class Material:
     strain and is overstepped by `viscosity` [Pa s] times its rate (Kirchhoff stress where F_p is kept, second
     Piola-Kirchhoff stress of "stvk"). There creep leaves the volume alone. Springs yield one by one, in pressure at
     `compression_limit` in place of the first limit, if it is given.
+    fracture: when it breaks; None: never.
     Raises InputError for values outside these bounds.
     """
 
@@ -64,6 +66,7 @@ class Material:
     hardening: float | None = None
     viscosity: float | None = None
     compression_limit: float | None = None
+    fracture: Fracture | None = None
 
     def __post_init__(self) -> None:
         check.choice("model", self.model, MODELS)

@@ -140,6 +140,7 @@ class Scene:
     suits soft or tiny scenes at best and is there for comparison.
     tolerance: relative residual at which the linear solver stops.  max_iterations: its cap, told when hit.
     newton_tolerance: size of the out-of-balance force, relative to the first, at which Newton's method stops.
+    seed: of what is random, which is how cracks begin.  max_splits: of vertices in a step, told when hit.
     """
 
     bodies: Sequence[Body]
@@ -153,6 +154,8 @@ class Scene:
     tolerance: float = 1e-3
     max_iterations: int = 2000
     newton_tolerance: float = 1e-6
+    seed: int = 0
+    max_splits: int = 100
     name: str = "scene"
     description: str = ""
     camera: Camera = field(default_factory=Camera)
@@ -175,6 +178,13 @@ class Scene:
         check.number("tolerance", self.tolerance, above=0, below=1)
         check.whole("max_iterations", self.max_iterations)
         check.number("newton_tolerance", self.newton_tolerance, above=0, below=1)
+        check.whole("seed", self.seed, at_least=0)
+        check.whole("max_splits", self.max_splits)
+        materials = [m for body in self.bodies for m in (body.material, *body.materials.values())]
+        if self.integrator == "quasi-static" and any(m.fracture for m in materials):
+            raise InputError(
+                'integrator "quasi-static" has no inertia, and pieces that come off need it: choose another'
+            )
 
     @classmethod
     def from_file(cls, path: str, *, overrides: Sequence[str] = ()) -> Scene:

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from taichifem.description import check
 from taichifem.errors import InputError
 
-COLORS = ("material", "von-mises", "plastic-strain", "displacement", "speed")
+COLORS = ("material", "piece", "von-mises", "plastic-strain", "displacement", "speed")
 RENDERERS = ("auto", "taichi", "ggui", "pyvista")
 
 
@@ -37,7 +37,7 @@ class Camera:
 class View:
     """What a frame shows.
 
-    color: "material" (each body's own colour), "von-mises" [Pa], "plastic-strain" (what has
+    color: "material" (each body's own colour), "piece" (each piece's), "von-mises" [Pa], "plastic-strain" (what has
     accumulated), "displacement" [m] or "speed" [m/s].
     range: (low, high) of the colour bar; None follows the data (the top only grows).
     wire: draw the element edges on the surface.  hud: print time, cost and counts into the picture.

@@ -20,6 +20,9 @@ PALETTE = (
 
 COLLIDER = "#a9adb3"
 
+CRACK = np.array([0.95, 0.93, 0.88], np.float32)
+"""What the colour of a body goes towards on faces that fracture has opened."""
+
 # The published anchors of viridis at nine equal steps.
 _VIRIDIS = (
     "#440154",

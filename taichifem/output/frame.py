@@ -11,6 +11,7 @@ import numpy as np
 
 from taichifem.description.colliders import BoxCollider, Collider, PlaneCollider
 from taichifem.description.motion import rotation_matrix
+from taichifem.description.view import View
 from taichifem.output import colors
 
 
@@ -120,6 +121,16 @@ def _unit_sphere(rings: int = 24, sectors: int = 48) -> tuple[np.ndarray, np.nda
     return points, np.vstack(faces).astype(np.int32)
 
 
+def _surface_colors(simulation: Any, view: View) -> np.ndarray:
+    """Colours (k,3) of the triangles: of their bodies or pieces, and what cracks opened paler."""
+    if view.color == "piece":
+        return colors.body_colors(simulation.piece_count, view.colors)[simulation.surface_pieces]
+    found = colors.body_colors(len(simulation.scene.bodies), view.colors)[np.asarray(simulation.surface_bodies)]
+    cracked = np.asarray(simulation.crack_faces)
+    found[cracked] = 0.35 * found[cracked] + 0.65 * colors.CRACK
+    return found
+
+
 class FrameBuilder:
     """Takes frames of one simulation: remembers the topology and how high the colour bar has grown."""
 
@@ -132,11 +143,10 @@ class FrameBuilder:
         """The frame of `simulation` now."""
         view = simulation.scene.view
         values, label, unit = self._values(simulation, view.color)
-        bodies = colors.body_colors(len(simulation.scene.bodies), view.colors)
         return Frame(
             points=np.ascontiguousarray(simulation.positions, np.float32),
             triangles=np.ascontiguousarray(simulation.surface, np.int32),
-            colors=bodies[np.asarray(simulation.surface_bodies)],
+            colors=_surface_colors(simulation, view),
             values=values,
             value_range=self._range(values, view.range),
             value_label=label,

@@ -19,6 +19,7 @@ class StubSimulation:
         self.scene = Scene(bodies=[Body(mesh=mesh)], fps=30, name="a/b <bar>")
         self.rest_positions, self.cells = mesh.points, mesh.cells
         self.surface = mesh.surface()
+        self.crack_faces = np.zeros(len(self.surface), dtype=bool)
         self.cell_bodies = np.zeros(len(self.cells), int)
         self.cell_regions = np.arange(len(self.cells)) % 2
         self.frame, self.diverges_at, self.interrupted_at = 0, diverges_at, interrupted_at

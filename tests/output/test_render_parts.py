@@ -26,6 +26,7 @@ class FakeSimulation:
         self.positions = mesh.points * [1.5, 1, 1]
         self.velocities = np.tile([3.0, 0.0, 4.0], (len(mesh.points), 1))
         self.surface_bodies = np.zeros(len(self.surface), int)
+        self.crack_faces = np.zeros(len(self.surface), bool)
         self.node_bodies = np.zeros(len(mesh.points), int)
         self.time = 1.5
         self.stress = np.full(len(self.cells), 2e3)
@@ -184,3 +185,14 @@ def test_bad_requests_are_refused():
         make_renderer(size=(5, 0))
     with pytest.raises(InputError, match="quality"):
         make_renderer(quality="best")
+
+
+def test_what_cracks_opened_is_paler_and_pieces_have_colours():
+    simulation = FakeSimulation(colors=("#204060",))
+    simulation.crack_faces[:3] = True
+    found = build_frame(simulation).colors
+    assert (found[:3] > found[3] + 0.3).all() and (found[3:] == found[3]).all()
+    simulation = FakeSimulation(color="piece")
+    simulation.piece_count, simulation.surface_pieces = 2, np.arange(len(simulation.surface)) % 2
+    found = build_frame(simulation).colors
+    assert (found[0] == found[2]).all() and (found[0] != found[1]).any()

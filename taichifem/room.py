@@ -1,0 +1,63 @@
+"""How much room a scene needs in a world."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+
+from taichifem.description import Scene
+from taichifem.laws import Laws
+from taichifem.layout import Layout
+from taichifem.structure.levels import Levels
+from taichifem.structure.pattern import BlockPattern
+from taichifem.world import Capacity
+
+
+def room_for(
+    scene: Scene, layout: Layout, laws: Laws, *, pattern: BlockPattern, levels: Levels, program: np.ndarray
+) -> Capacity:
+    """Room for a scene; where it may break, until every element is on its own."""
+    capacity = Capacity(
+        nodes=len(layout.rest),
+        elements=len(layout.cells),
+        blocks=pattern.n_blocks,
+        pairs=pattern.n_pairs,
+        materials=len(layout.materials),
+        colliders=len(scene.colliders),
+        held=1 + sum(len(g.nodes) for g in layout.pins),
+        pulled=1 + sum(len(g.nodes) for g in layout.handles),
+        poses=len(layout.pins) + len(layout.handles),
+        bodies=len(scene.bodies),
+        aggregates=layout.aggregates.count,
+        coarse_blocks=len(levels.column) - pattern.n_blocks,
+        coarse_pairs=len(levels.pair),
+        members=len(levels.member),
+        operations=len(program),
+        dimension=layout.dimension,
+        tangents=laws.stores_tangents,
+        springs=laws.springs,
+        plastic=laws.plastic,
+    )
+    return _broken(capacity, layout) if any(m.fracture for m in layout.materials) else capacity
+
+
+def _broken(whole: Capacity, layout: Layout) -> Capacity:
+    """Every element brings its own nodes, and a block for each two of its corners; what is coarse grows as nodes do."""
+    elements, corners = layout.cells.shape
+    nodes, pairs = elements * corners, elements * corners * (corners + 1) // 2
+    around = np.bincount(layout.cells.ravel(), minlength=len(layout.rest))
+    grown = 1 + nodes // len(layout.rest)
+    return replace(
+        whole,
+        nodes=nodes,
+        blocks=nodes * corners,
+        pairs=pairs,
+        held=1 + sum(int(around[g.nodes].sum()) for g in layout.pins),
+        pulled=1 + sum(int(around[g.nodes].sum()) for g in layout.handles),
+        aggregates=grown * whole.aggregates,
+        coarse_blocks=grown * whole.coarse_blocks,
+        coarse_pairs=grown * whole.coarse_pairs,
+        members=pairs + grown * whole.coarse_pairs,
+        operations=2 * whole.operations,
+    )
