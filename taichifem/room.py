@@ -43,11 +43,14 @@ def room_for(
 
 
 def _broken(whole: Capacity, layout: Layout) -> Capacity:
-    """Every element brings its own nodes, and a block for each two of its corners; what is coarse grows as nodes do."""
+    """Every element brings its own nodes, and a block for each two of its corners.
+
+    What is coarse grows as the nodes do, and every piece has an aggregate of its own on each level.
+    """
     elements, corners = layout.cells.shape
     nodes, pairs = elements * corners, elements * corners * (corners + 1) // 2
     around = np.bincount(layout.cells.ravel(), minlength=len(layout.rest))
-    grown = 1 + nodes // len(layout.rest)
+    grown, own = 1 + nodes // len(layout.rest), (2 + layout.aggregates.levels) * elements
     return replace(
         whole,
         nodes=nodes,
@@ -55,9 +58,9 @@ def _broken(whole: Capacity, layout: Layout) -> Capacity:
         pairs=pairs,
         held=1 + sum(int(around[g.nodes].sum()) for g in layout.pins),
         pulled=1 + sum(int(around[g.nodes].sum()) for g in layout.handles),
-        aggregates=grown * whole.aggregates,
-        coarse_blocks=grown * whole.coarse_blocks,
-        coarse_pairs=grown * whole.coarse_pairs,
-        members=pairs + grown * whole.coarse_pairs,
+        aggregates=grown * whole.aggregates + own,
+        coarse_blocks=grown * whole.coarse_blocks + 4 * own,
+        coarse_pairs=grown * whole.coarse_pairs + own,
+        members=pairs + grown * whole.coarse_pairs + own,
         operations=2 * whole.operations,
     )

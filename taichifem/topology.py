@@ -7,7 +7,7 @@ from dataclasses import replace
 import numpy as np
 
 from taichifem.layout import Group, Layout, LoadGroup
-from taichifem.mesh.connectivity import boundary_faces
+from taichifem.mesh.connectivity import boundary_faces, pieces
 from taichifem.structure.aggregates import aggregate
 
 
@@ -21,11 +21,14 @@ def split_layout(layout: Layout, cells: np.ndarray, origin: np.ndarray) -> Layou
     number_of = np.argsort(layout.node_order)
     row_of = np.argsort(layout.cell_order)
     bodies = layout.node_bodies[number_of][origin]
-    by_body = np.argsort(bodies, kind="stable")
-    starts = np.searchsorted(bodies[by_body], np.arange(len(layout.body_start)))
+    # To the solver each piece is a body: no rigid motion that it works with joins two of them.
+    _, piece = pieces(cells, len(origin))
+    by_piece = np.lexsort((piece, bodies))
+    starts = np.searchsorted(bodies[by_piece], np.arange(len(layout.body_start)))
+    ends = np.flatnonzero(np.diff(piece[by_piece])) + 1
     rest = layout.rest[number_of][origin]
-    aggregates = aggregate(rest[by_body], starts)
-    node_order = by_body[aggregates.order]
+    aggregates = aggregate(rest[by_piece], np.r_[0, ends, len(origin)])
+    node_order = by_piece[aggregates.order]
     number = np.argsort(node_order).astype(np.int32)
     corners = number[cells]
     cell_order = np.argsort(corners.min(axis=1), kind="stable")

@@ -1,5 +1,6 @@
-"""A few of the random scenes; `python tests/random_scenes.py` and `python tests/violent_scenes.py` run more."""
+"""A few of the random scenes; the scripts `random_scenes.py`, `violent_scenes.py` and `breaking_scenes.py` run more."""
 
+import breaking_scenes
 import pytest
 import random_scenes
 import violent_scenes
@@ -13,3 +14,9 @@ def test_random_scene(seed):
 @pytest.mark.parametrize("seed", [9, 21, *(pytest.param(seed, marks=pytest.mark.slow) for seed in range(10, 20))])
 def test_violent_scene_with_plasticity(seed):
     violent_scenes.run(seed)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("seed", range(4))
+def test_breaking_scene(seed):
+    breaking_scenes.run(seed)

@@ -60,7 +60,7 @@ def cut_somewhere(split: Splitting, points: np.ndarray, rng: np.random.Generator
     return True
 
 
-@pytest.mark.parametrize("seed", range(20))
+@pytest.mark.parametrize("seed", [*range(10), *(pytest.param(k, marks=pytest.mark.slow) for k in range(10, 250))])
 def test_random_cuts_leave_sound_meshes(seed):
     rng = np.random.default_rng(seed)
     for _ in range(4):
