@@ -4,12 +4,14 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass, field
+from functools import cached_property
 from itertools import combinations
 
 import numpy as np
 
 from taichifem.description import Body, Handle, Load, Material, Motion, Pin, Region, Scene
 from taichifem.errors import InputError
+from taichifem.mesh.connectivity import boundary_faces
 from taichifem.structure.aggregates import Aggregates, aggregate
 
 AXES = {2: [0, 2], 3: [0, 1, 2]}
@@ -42,6 +44,23 @@ class LoadGroup:
     load: Load
     where: np.ndarray
     thickness: float = 1.0
+
+
+@dataclass(frozen=True)
+class Boundary:
+    """Boundary faces (k,d) of a mesh, the element (k,) each belongs to, and keys (k,) that outlive renumbering."""
+
+    faces: np.ndarray
+    owner: np.ndarray
+    keys: np.ndarray
+
+
+def boundary_of(cells: np.ndarray, cell_order: np.ndarray) -> Boundary:
+    """The boundary of the elements `cells` (m,d+1), which have the numbers `cell_order` in the scene."""
+    faces, owner = boundary_faces(cells)
+    opposite = cells[owner].sum(axis=1) - faces.sum(axis=1)
+    corner = (cells[owner] == opposite[:, None]).argmax(axis=1)
+    return Boundary(faces, owner, cell_order[owner].astype(np.int64) * cells.shape[1] + corner)
 
 
 @dataclass
@@ -92,6 +111,11 @@ class Layout:
     def _edges(self) -> np.ndarray:
         corners = self.rest[self.cells][:, :, AXES[self.dimension]]
         return (corners[:, 1:] - corners[:, :1]).transpose(0, 2, 1)
+
+    @cached_property
+    def boundary(self) -> Boundary:
+        """Its boundary faces."""
+        return boundary_of(self.cells, self.cell_order)
 
     @property
     def edge_shares(self) -> np.ndarray:

@@ -6,8 +6,8 @@ from dataclasses import replace
 
 import numpy as np
 
-from taichifem.layout import Group, Layout, LoadGroup
-from taichifem.mesh.connectivity import boundary_faces, pieces
+from taichifem.layout import Group, Layout, LoadGroup, boundary_of
+from taichifem.mesh.connectivity import pieces
 from taichifem.structure.aggregates import aggregate
 
 
@@ -34,7 +34,7 @@ def split_layout(layout: Layout, cells: np.ndarray, origin: np.ndarray) -> Layou
     cell_order = np.argsort(corners.min(axis=1), kind="stable")
     corners, rows = corners[cell_order], row_of[cell_order]
     node_from = number_of[origin[node_order]]
-    surface, owner, cracked = _surface(corners, cell_order, _keys(layout.cells, layout.cell_order)[2])
+    surface, owner, cracked = _surface(corners, cell_order, layout)
     return replace(
         layout,
         rest=layout.rest[node_from],
@@ -58,21 +58,13 @@ def split_layout(layout: Layout, cells: np.ndarray, origin: np.ndarray) -> Layou
     )
 
 
-def _keys(cells: np.ndarray, cell_order: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """The boundary faces of tetrahedra, whose they are, and a number for each that outlives renumbering."""
-    faces, owner = boundary_faces(cells)
-    opposite = cells[owner].sum(axis=1) - faces.sum(axis=1)
-    corner = (cells[owner] == opposite[:, None]).argmax(axis=1)
-    return faces, owner, cell_order[owner].astype(np.int64) * cells.shape[1] + corner
-
-
-def _surface(cells: np.ndarray, cell_order: np.ndarray, skin: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+def _surface(cells: np.ndarray, cell_order: np.ndarray, whole: Layout) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """Triangles to draw (k,3), the element of each, and whether a crack opened it."""
     if cells.shape[1] == 3:
         in_scene = np.argsort(cell_order)
         return cells[in_scene], in_scene, np.zeros(len(cells), dtype=bool)
-    faces, owner, keys = _keys(cells, cell_order)
-    return faces, owner, ~np.isin(keys, skin)
+    now = boundary_of(cells, cell_order)
+    return now.faces, now.owner, ~np.isin(now.keys, whole.boundary.keys)
 
 
 def _group(group: Group, layout: Layout, node_from: np.ndarray) -> Group:
@@ -84,8 +76,8 @@ def _load(load: LoadGroup, layout: Layout, cells: np.ndarray, node_from: np.ndar
     if load.where.ndim == 1:
         return replace(load, where=_copies(load.where, layout, node_from))
     # A face goes with the element that has it.
-    faces, owner = boundary_faces(layout.cells)
-    element_of = {frozenset(face): int(e) for face, e in zip(faces.tolist(), owner, strict=True)}
+    boundary = layout.boundary
+    element_of = {frozenset(face): e for face, e in zip(boundary.faces.tolist(), boundary.owner.tolist(), strict=True)}
     element = np.array([element_of[frozenset(face)] for face in load.where.tolist()])
     corner = (layout.cells[element][:, None, :] == load.where[:, :, None]).argmax(axis=2)
     return replace(load, where=np.take_along_axis(cells[layout.cell_order[element]], corner, axis=1))

@@ -5,7 +5,6 @@
 No NaN, no exception, and after every split a valid mesh of the same mass. The test suite runs a few of them.
 """
 
-import argparse
 import sys
 from dataclasses import replace
 
@@ -58,21 +57,5 @@ def run(seed: int) -> str:
     return line
 
 
-def main() -> int:
-    parser = argparse.ArgumentParser(description=__doc__)
-    parser.add_argument("--count", type=int, default=50)
-    parser.add_argument("--first", type=int, default=0)
-    options = parser.parse_args()
-    failed = 0
-    for seed in range(options.first, options.first + options.count):
-        try:
-            print(run(seed), flush=True)
-        except Exception as error:
-            failed += 1
-            print(f"FAILED seed {seed}: {type(error).__name__}: {error}", flush=True)
-    print(f"{options.count - failed} passed, {failed} failed")
-    return 1 if failed else 0
-
-
 if __name__ == "__main__":
-    sys.exit(main())
+    sys.exit(random_scenes.main(run, __doc__, count=50))

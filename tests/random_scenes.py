@@ -7,6 +7,7 @@ The test suite runs a few of them.
 
 import argparse
 import sys
+from collections.abc import Callable
 
 import numpy as np
 
@@ -87,16 +88,16 @@ def run(seed: int, precision: str = "f32") -> str:
     return f"seed {seed}: fastest {fastest:.1f} m/s, {capped} steps at the cap, {simulation.stats}"
 
 
-def main() -> int:
-    parser = argparse.ArgumentParser(description=__doc__)
-    parser.add_argument("--count", type=int, default=100)
+def main(run: Callable[[int], str], description: str, *, count: int) -> int:
+    """The command of a script: run some seeds, tell of each, and go on where one fails. The exit code."""
+    parser = argparse.ArgumentParser(description=description)
+    parser.add_argument("--count", type=int, default=count)
     parser.add_argument("--first", type=int, default=0)
-    parser.add_argument("--precision", default="f32")
     options = parser.parse_args()
     failed = 0
     for seed in range(options.first, options.first + options.count):
         try:
-            print(run(seed, options.precision), flush=True)
+            print(run(seed), flush=True)
         except Exception as error:
             failed += 1
             print(f"FAILED seed {seed}: {type(error).__name__}: {error}", flush=True)
@@ -105,4 +106,4 @@ def main() -> int:
 
 
 if __name__ == "__main__":
-    sys.exit(main())
+    sys.exit(main(run, __doc__, count=100))
