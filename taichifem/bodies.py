@@ -22,6 +22,7 @@ from taichifem.linear_algebra.program import write_program
 from taichifem.linear_algebra.spectrum import highest_frequency
 from taichifem.processes.loading import Loading
 from taichifem.room import room_for
+from taichifem.skin import Skin, whole_skin
 from taichifem.structure.levels import Levels, stack_levels
 from taichifem.structure.pattern import BlockPattern, block_pattern, to_sparse
 from taichifem.surroundings import Surroundings, pose
@@ -44,6 +45,7 @@ class Bodies:
         self._whole = layout
         self._materials = list(layout.materials)
         self._laws = Laws(self._materials, exact=scene.integrator in EXACT)
+        self._first_skin = whole_skin(scene)
         self._take(layout)
         self._generation = runtime.generation
         room = room_for(scene, layout, self._laws, pattern=self._pattern, levels=self._levels, program=self._program)
@@ -60,15 +62,23 @@ class Bodies:
         self._loading = Loading(layout)
         self._levels: Levels = stack_levels(self._pattern, layout.aggregates)
         self._galerkin = Galerkin(layout.aggregates, self._levels) if self.scene.solver == "multilevel" else None
-        self._program = write_program(self._pattern, layout.aggregates, solver=self.scene.solver)
+        self._program = write_program(
+            self._pattern, layout.aggregates, solver=self.scene.solver, apart=self._levels.apart
+        )
 
     def _fill(self) -> None:
         """Fill the world with it, at rest."""
+        self._fill_topology()
+        with self._kernels():
+            transfer.fill(self._world, self._layout)
+
+    def _fill_topology(self) -> None:
+        """Give the world what follows from the mesh."""
         layout, pattern = self._layout, self._pattern
         self._counts.nodes, self._counts.elements = len(layout.rest), len(layout.cells)
         self._counts.pairs, self._counts.pieces = pattern.n_pairs, pattern.pieces
         with self._kernels():
-            transfer.fill(self._world, layout, pattern)
+            transfer.fill_topology(self._world, layout, pattern)
             transfer.fill_levels(self._world, pattern, self._levels, layout.aggregates, self._program)
         self._surroundings = Surroundings(self.scene, layout, self._world, self._counts)
 
@@ -151,12 +161,16 @@ class Bodies:
     @property
     def surface(self) -> np.ndarray:
         """Outward triangles of all bodies (k,3), as node indices; of planar bodies, all their elements."""
-        return self._layout.node_order[self._layout.surface]
+        return self._skin.triangles
 
     @property
     def surface_bodies(self) -> np.ndarray:
         """Body of each surface triangle (k,)."""
-        return self._layout.surface_bodies
+        return self._skin.bodies
+
+    @property
+    def _skin(self) -> Skin:
+        return self._first_skin
 
     # State
 

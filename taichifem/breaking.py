@@ -7,9 +7,10 @@ import numpy as np
 from taichifem import transfer
 from taichifem.bodies import Bodies
 from taichifem.description import Scene
-from taichifem.mesh.connectivity import pieces
 from taichifem.processes import fracture
-from taichifem.state import element_fields, node_fields
+from taichifem.skin import Skin, split_skin
+from taichifem.structure.pieces import label_pieces
+from taichifem.structure.splitting import Splitting
 from taichifem.topology import split_layout
 
 
@@ -19,46 +20,61 @@ class BreakingBodies(Bodies):
     def __init__(self, scene: Scene, *, precision: str, arch: str | None, threads: int | None) -> None:
         super().__init__(scene, precision=precision, arch=arch, threads=threads)
         self._may_break = any(material.fracture for material in self._materials)
-        self._origin = np.arange(self._counts.nodes)  # of which node of the scene each is a copy
-        self._tips = np.zeros(self._counts.nodes, dtype=bool)  # where cracks end
+        self._splitting = Splitting(super().cells, np.arange(self._counts.nodes)) if self._may_break else None
+        self._intact = self._splitting.beside.copy() if self._may_break else None
         self.splits, self.more_splits = 0, False  # in the last step: how many, and was the cap hit?
         self._pieces: tuple[int, np.ndarray, np.ndarray] | None = None
+        self._opened: Skin | None = None
+
+    @property
+    def cells(self) -> np.ndarray:
+        """Elements (m,d+1): tetrahedra, or triangles of planar bodies."""
+        return self._splitting.cells.copy() if self._may_break else super().cells
 
     @property
     def piece_count(self) -> int:
         """Number of pieces: sets of elements that hang together."""
-        return self._labelled()[0]
+        return self._labelled[0]
 
     @property
     def cell_pieces(self) -> np.ndarray:
         """Piece of each element (m,), from 0; those of the first elements come first."""
-        return self._labelled()[1]
+        return self._labelled[1]
 
     @property
     def surface_pieces(self) -> np.ndarray:
         """Piece of each triangle of the surface (k,)."""
-        return self._labelled()[2][self.surface[:, 0]]
+        return self._labelled[2][self.surface[:, 0]]
 
     @property
     def origins(self) -> np.ndarray:
         """Of which node of the scene each node is a copy (n,); those of the scene are their own."""
-        return self._origin.copy()
+        return self._splitting.origin.copy() if self._may_break else np.arange(self._counts.nodes)
+
+    @property
+    def crack_tips(self) -> np.ndarray:
+        """At which nodes (n,) do cracks end?"""
+        return self._splitting.tips if self._may_break else np.zeros(self._counts.nodes, dtype=bool)
 
     @property
     def crack_faces(self) -> np.ndarray:
         """Which triangles of the surface (k,) fracture has opened."""
-        return self._layout.cracked
+        return self._skin.cracked
 
+    @property
     def _labelled(self) -> tuple[int, np.ndarray, np.ndarray]:
         """Number of pieces, and the piece of each element and of each node."""
         if self._pieces is None:
-            count, of_node = pieces(self.cells, self._counts.nodes)
-            of_cell = of_node[self.cells[:, 0]]
-            _, first = np.unique(of_cell, return_index=True)
-            rank = np.empty(count, dtype=np.int32)
-            rank[of_cell[np.sort(first)]] = np.arange(count)
-            self._pieces = count, rank[of_cell], rank[of_node]
+            self._pieces = label_pieces(self.cells, self._counts.nodes)
         return self._pieces
+
+    @property
+    def _skin(self) -> Skin:
+        if not self._may_break:
+            return super()._skin
+        if self._opened is None:
+            self._opened = split_skin(self.cells, self._splitting.beside, self._intact, self.cell_bodies)
+        return self._opened
 
     def _break(self, step: int) -> bool:
         """Split what is torn beyond its toughness; did anything part? step: number of the step, for the seed."""
@@ -71,44 +87,37 @@ class BreakingBodies(Bodies):
         torn = np.flatnonzero(excess > 1)
         if not len(torn):
             return False
-        broken = fracture.propagate(
-            self.cells,
+        torn = torn[np.argsort(-excess[torn], kind="stable")]
+        done = self._splitting.tear(
             self.positions,
-            self._read(self._world.stress),
-            torn[np.argsort(-excess[torn], kind="stable")],
-            self._tips,
-            rng=np.random.default_rng([self.scene.seed, step]),
+            torn,
+            self._read(self._world.stress)[torn],
+            seed=(self.scene.seed, step),
             most=self.scene.max_splits,
         )
-        if broken is None:
-            return False
-        self.splits, self.more_splits = broken.splits, broken.capped
-        self._reshape(broken.split.cells, np.array(broken.split.origin))
-        self._tips = broken.tips
-        return True
+        self.splits, self.more_splits = done.splits, done.capped
+        if done.splits:
+            self._reshape(done.parent)
+        return done.splits > 0
 
-    def _reshape(self, cells: np.ndarray, parent: np.ndarray) -> None:
-        """Go on with the elements `cells`; parent (n,): the present node that each node is, or is a copy of."""
-        w, counts = self._world, self._counts
-        of_nodes, of_elements = node_fields(self.scene), element_fields(self._laws)
+    def _reshape(self, parent: np.ndarray) -> None:
+        """Go on with the elements as they are split; parent (n,): the present node that each is, or is a copy of."""
+        w, counts, before = self._world, self._counts, self._layout.node_number
         with self._kernels():
-            nodes = {k: self._given(transfer.read(w, getattr(w, k), counts.nodes))[parent] for k in of_nodes}
-            elements = {k: self._given_cells(transfer.read(w, getattr(w, k), counts.elements)) for k in of_elements}
-            contacts = transfer.read_contacts(w, counts.colliders, counts.nodes)
-        before = np.argsort(self._layout.node_order)[parent]
-        self._become(cells, self._origin[parent])
-        layout = self._layout
+            state = transfer.read_nodes(w, counts)
+        self._take(self._split_layout())
+        self._fill_topology()
         with self._kernels():
-            for name, values in nodes.items():
-                transfer.write(w, getattr(w, name), values[layout.node_order])
-            for name, values in elements.items():
-                transfer.write(w, getattr(w, name), values[layout.cell_order])
-            here = before[layout.node_order]
-            transfer.write_contacts(w, {name: values[:, here] for name, values in contacts.items()})
+            transfer.write_nodes(w, counts, state, before[parent[self._layout.node_order]])
 
-    def _become(self, cells: np.ndarray, origin: np.ndarray) -> None:
+    def _become(self, cells: np.ndarray, origin: np.ndarray, tips: np.ndarray) -> None:
         """Have the elements `cells`, of nodes and copies of the scene's nodes `origin`, everything at rest."""
-        whole = len(origin) == len(self._whole.rest)
-        self._origin, self._pieces = origin, None
-        self._take(self._whole if whole else split_layout(self._whole, cells, origin))
+        self._splitting = Splitting(cells, origin, tips)
+        self._take(self._split_layout())
         self._fill()
+
+    def _split_layout(self):
+        split = self._splitting
+        self._pieces, self._opened = label_pieces(split.cells, len(split.origin)), None
+        whole = len(split.origin) == len(self._whole.rest)
+        return self._whole if whole else split_layout(self._whole, split.cells, split.origin, self._pieces[2])

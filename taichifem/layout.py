@@ -46,31 +46,13 @@ class LoadGroup:
     thickness: float = 1.0
 
 
-@dataclass(frozen=True)
-class Boundary:
-    """Boundary faces (k,d) of a mesh, the element (k,) each belongs to, and keys (k,) that outlive renumbering."""
-
-    faces: np.ndarray
-    owner: np.ndarray
-    keys: np.ndarray
-
-
-def boundary_of(cells: np.ndarray, cell_order: np.ndarray) -> Boundary:
-    """The boundary of the elements `cells` (m,d+1), which have the numbers `cell_order` in the scene."""
-    faces, owner = boundary_faces(cells)
-    opposite = cells[owner].sum(axis=1) - faces.sum(axis=1)
-    corner = (cells[owner] == opposite[:, None]).argmax(axis=1)
-    return Boundary(faces, owner, cell_order[owner].astype(np.int64) * cells.shape[1] + corner)
-
-
 @dataclass
 class Layout:
     """Arrays of a whole scene. Nodes and elements of a body are a contiguous range.
 
     dimension d: 3 for tetrahedra, 2 for triangles in the plane y = 0.
     rest (n,3) [m], velocities (n,3) [m/s], cells (m,d+1), thickness (m,) [m] (1 in space), node_bodies (n,),
-    cell_bodies (m,), cell_materials (m,) into `materials`, regions (m,), surface (k,3) triangles to draw, outward,
-    surface_bodies (k,), cracked (k,): faces that fracture opened, body_start (bodies+1,).
+    cell_bodies (m,), cell_materials (m,) into `materials`, regions (m,), body_start (bodies+1,).
 
     Nodes are numbered such that those of an aggregate of the solver follow one another, and elements after their
     nodes: what is used together lies together. node_order (n,), cell_order (m,): the numbers they had in the scene.
@@ -85,9 +67,6 @@ class Layout:
     cell_bodies: np.ndarray
     cell_materials: np.ndarray
     regions: np.ndarray
-    surface: np.ndarray
-    surface_bodies: np.ndarray
-    cracked: np.ndarray
     body_start: np.ndarray
     materials: list[Material]
     material_of: dict[tuple[int, int | None], int]
@@ -113,9 +92,23 @@ class Layout:
         return (corners[:, 1:] - corners[:, :1]).transpose(0, 2, 1)
 
     @cached_property
-    def boundary(self) -> Boundary:
-        """Its boundary faces."""
-        return boundary_of(self.cells, self.cell_order)
+    def node_number(self) -> np.ndarray:
+        """The number (n,) here of each node of the scene."""
+        return np.argsort(self.node_order)
+
+    @cached_property
+    def load_corners(self) -> list[tuple[np.ndarray, np.ndarray] | None]:
+        """Of each load on faces (k,d): the element (k,) that has the face, and which corners (k,d) it is."""
+        faces, owner = boundary_faces(self.cells)
+        element_of = {frozenset(face): e for face, e in zip(faces.tolist(), owner.tolist(), strict=True)}
+        found = []
+        for load in self.loads:
+            if load.where.ndim == 1:
+                found.append(None)
+                continue
+            element = np.array([element_of[frozenset(face)] for face in load.where.tolist()])
+            found.append((element, (self.cells[element][:, None, :] == load.where[:, :, None]).argmax(axis=2)))
+        return found
 
     @property
     def edge_shares(self) -> np.ndarray:
@@ -175,7 +168,7 @@ def _dimension(scene: Scene) -> int:
 def lay_out(scene: Scene) -> Layout:
     """Concatenate the scene's bodies. Raises InputError where a pin, handle or load selects nothing."""
     rest, velocities, cells, thickness, node_bodies, cell_bodies, cell_materials = [], [], [], [], [], [], []
-    regions, surface, surface_bodies, body_start = [], [], [], [0]
+    regions, body_start = [], [0]
     materials: list[Material] = []
     material_of: dict[tuple[int, int | None], int] = {}
     pins, handles, loads = [], [], []
@@ -200,9 +193,6 @@ def lay_out(scene: Scene) -> Layout:
         regions.append(mesh.regions)
         node_bodies.append(np.full(len(points), b, dtype=np.int32))
         cell_bodies.append(np.full(len(mesh.cells), b, dtype=np.int32))
-        triangles = mesh.surface()
-        surface.append(triangles + first)
-        surface_bodies.append(np.full(len(triangles), b, dtype=np.int32))
         held, pulled = _groups(body, label, points, first)
         pins += held
         handles += pulled
@@ -229,9 +219,6 @@ def lay_out(scene: Scene) -> Layout:
         cell_bodies=np.concatenate(cell_bodies)[elements],
         cell_materials=np.concatenate(cell_materials)[elements],
         regions=np.concatenate(regions)[elements],
-        surface=number[np.concatenate(surface)],
-        surface_bodies=np.concatenate(surface_bodies),
-        cracked=np.zeros(sum(map(len, surface)), dtype=bool),
         body_start=np.asarray(body_start, dtype=np.int32),
         materials=materials,
         material_of=material_of,

@@ -9,8 +9,10 @@ import numpy as np
 from taichifem.description import Scene
 from taichifem.laws import Laws
 from taichifem.layout import Layout
+from taichifem.linear_algebra.program import most_operations
 from taichifem.structure.levels import Levels
 from taichifem.structure.pattern import BlockPattern
+from taichifem.structure.regrouping import most_aggregates
 from taichifem.world import Capacity
 
 
@@ -45,12 +47,14 @@ def room_for(
 def _broken(whole: Capacity, layout: Layout) -> Capacity:
     """Every element brings its own nodes, and a block for each two of its corners.
 
-    What is coarse grows as the nodes do, and every piece has an aggregate of its own on each level.
+    Pairs of aggregates grow as the nodes do, and every aggregate has one with itself.
     """
     elements, corners = layout.cells.shape
     nodes, pairs = elements * corners, elements * corners * (corners + 1) // 2
     around = np.bincount(layout.cells.ravel(), minlength=len(layout.rest))
-    grown, own = 1 + nodes // len(layout.rest), (2 + layout.aggregates.levels) * elements
+    levels = layout.aggregates.levels
+    aggregates, grown = most_aggregates(nodes, elements, levels), 1 + nodes // len(layout.rest)
+    coarse_pairs = grown * whole.coarse_pairs + aggregates
     return replace(
         whole,
         nodes=nodes,
@@ -58,9 +62,9 @@ def _broken(whole: Capacity, layout: Layout) -> Capacity:
         pairs=pairs,
         held=1 + sum(int(around[g.nodes].sum()) for g in layout.pins),
         pulled=1 + sum(int(around[g.nodes].sum()) for g in layout.handles),
-        aggregates=grown * whole.aggregates + own,
-        coarse_blocks=grown * whole.coarse_blocks + 4 * own,
-        coarse_pairs=grown * whole.coarse_pairs + own,
-        members=pairs + grown * whole.coarse_pairs + own,
-        operations=2 * whole.operations,
+        aggregates=aggregates,
+        coarse_blocks=8 * coarse_pairs,
+        coarse_pairs=coarse_pairs,
+        members=pairs + coarse_pairs,
+        operations=most_operations(levels + 1),
     )

@@ -301,7 +301,7 @@ class Simulation(BreakingBodies):
         with self._kernels():
             arrays = {name: transfer.read(w, getattr(w, name), count) for name, count in self._state().items()}
             arrays |= transfer.read_contacts(w, self._counts.colliders, self._counts.nodes)
-        arrays |= {"cells": self.cells, "origins": self.origins, "tips": self._tips}
+        arrays |= {"cells": self.cells, "origins": self.origins, "tips": self.crack_tips}
         header = {"scene": self._fingerprint(), "clock": asdict(self._clock), "fresh": self._fresh, "due": self._due}
         checkpoint.write(path, arrays, header)
 
@@ -316,11 +316,11 @@ class Simulation(BreakingBodies):
         if header.get("scene") != self._fingerprint() or clock.fps != self.scene.fps or not same_steps:
             raise InputError(f"{path}: the checkpoint belongs to another scene, time step or precision")
         w = self._world
-        if np.array_equal(arrays["cells"], self.cells):
+        same = all(np.array_equal(arrays[k], v) for k, v in (("cells", self.cells), ("tips", self.crack_tips)))
+        if same:
             self._surroundings.forget()
         else:
-            self._become(arrays["cells"], arrays["origins"])
-        self._tips = arrays["tips"]
+            self._become(arrays["cells"], arrays["origins"], arrays["tips"])
         with self._kernels():
             for name in self._state():
                 transfer.write(w, getattr(w, name), arrays[name])

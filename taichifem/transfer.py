@@ -7,19 +7,18 @@ from taichifem.runtime import PRECISIONS, ti
 from taichifem.structure.aggregates import Aggregates
 from taichifem.structure.levels import Levels
 from taichifem.structure.pattern import BlockPattern
-from taichifem.world import MEMORY, World
+from taichifem.world import MEMORY, Counts, World
 
 _array = ti.types.ndarray
 
 
 @ti.kernel
-def _fill_nodes(w: ti.template(), rest: _array(), v: _array(), incident_start: _array(), incident: _array()):
-    for i in range(rest.shape[0]):
+def _fill_nodes(w: ti.template(), v: _array()):
+    for i in range(v.shape[0]):
         for k in ti.static(range(3)):
-            w.rest[i][k] = rest[i, k]
-            w.x[i][k] = rest[i, k]
             w.v[i][k] = v[i, k]
             w.v0[i][k] = v[i, k]
+        w.x[i] = w.rest[i]
         w.dv[i] = ti.Vector.zero(w.real, 3)
         w.past[i] = ti.Matrix.zero(w.real, 3, MEMORY + 1)
         w.outside[i] = ti.Vector.zero(w.real, 3)
@@ -27,19 +26,13 @@ def _fill_nodes(w: ti.template(), rest: _array(), v: _array(), incident_start: _
             w.touching[c, i] = 0
             w.slip[c, i] = ti.Vector.zero(w.real, 3)
             w.pressed[c, i] = 0.0
-    for i in range(incident_start.shape[0]):
-        w.incident_start[i] = incident_start[i]
-    for i in range(incident.shape[0]):
-        w.incident[i] = incident[i]
 
 
 @ti.kernel
 def _fill_elements(w: ti.template(), indices: _array(), gradients: _array(), volume: _array()):
     for e in range(indices.shape[0]):
-        for a in ti.static(range(w.corners)):
-            w.cell[e][a] = indices[e, a]
-        w.material[e] = indices[e, w.corners]
-        w.body[e] = indices[e, w.corners + 1]
+        w.material[e] = indices[e, 0]
+        w.body[e] = indices[e, 1]
         for a in ti.static(range(w.d)):
             for k in ti.static(range(w.d)):
                 w.gradients[e][a, k] = gradients[e, a, k]
@@ -52,6 +45,20 @@ def _fill_elements(w: ti.template(), indices: _array(), gradients: _array(), vol
             if ti.static(w.capacity.springs):
                 w.spring_growth[e] = ti.zero(w.spring_growth[e])
                 w.spring_hardened[e] = ti.zero(w.spring_hardened[e])
+
+
+@ti.kernel
+def _fill_mesh(w: ti.template(), rest: _array(), cells: _array(), incident_start: _array(), incident: _array()):
+    for i in range(rest.shape[0]):
+        for k in ti.static(range(3)):
+            w.rest[i][k] = rest[i, k]
+    for e in range(cells.shape[0]):
+        for a in ti.static(range(w.corners)):
+            w.cell[e][a] = cells[e, a]
+    for i in range(incident_start.shape[0]):
+        w.incident_start[i] = incident_start[i]
+    for i in range(incident.shape[0]):
+        w.incident[i] = incident[i]
 
 
 @ti.kernel
@@ -198,6 +205,30 @@ def _read(source: ti.template(), target: _array(), n: ti.i32):
                 target[i, a, b] = source[i][a, b]
 
 
+_STATE = 18 + 3 * (MEMORY + 1)
+"""Numbers that a node goes on with: x, v, v0, past_x, past_v, dv, and what the last steps did."""
+
+
+@ti.kernel
+def _read_nodes(w: ti.template(), state: _array()):
+    for i in range(state.shape[0]):
+        for k in ti.static(range(3)):
+            for m, field in ti.static(enumerate((w.x, w.v, w.v0, w.past_x, w.past_v, w.dv))):
+                state[i, 3 * m + k] = field[i][k]
+            for m in ti.static(range(MEMORY + 1)):
+                state[i, 18 + 3 * m + k] = w.past[i][k, m]
+
+
+@ti.kernel
+def _write_nodes(w: ti.template(), state: _array(), source: _array()):
+    for i in range(source.shape[0]):
+        for k in ti.static(range(3)):
+            for m, field in ti.static(enumerate((w.x, w.v, w.v0, w.past_x, w.past_v, w.dv))):
+                field[i][k] = state[source[i], 3 * m + k]
+            for m in ti.static(range(MEMORY + 1)):
+                w.past[i][k, m] = state[source[i], 18 + 3 * m + k]
+
+
 @ti.kernel
 def _read_contacts(w: ti.template(), slip: _array(), pressed: _array(), touching: _array()):
     for c, i in ti.ndrange(touching.shape[0], touching.shape[1]):
@@ -225,15 +256,19 @@ def _real(w: World, array: np.ndarray) -> np.ndarray:
     return np.ascontiguousarray(array, dtype=dtype_of(w))
 
 
-def fill(w: World, layout: Layout, pattern: BlockPattern) -> None:
-    """Everything that is fixed while the topology is, and the state at the start."""
-    start, incident = pattern.incident_start, pattern.incident
-    _fill_nodes(w, _real(w, layout.rest), _real(w, layout.velocities), start, incident)
-    indices = np.column_stack([layout.cells, layout.cell_materials, layout.cell_bodies]).astype(np.int32)
+def fill(w: World, layout: Layout) -> None:
+    """The state at the start, and what elements have whatever comes."""
+    _fill_nodes(w, _real(w, layout.velocities))
+    indices = np.column_stack([layout.cell_materials, layout.cell_bodies]).astype(np.int32)
     _fill_elements(w, indices, _real(w, layout.gradients), _real(w, layout.volumes))
+
+
+def fill_topology(w: World, layout: Layout, pattern: BlockPattern) -> None:
+    """Everything that is fixed while the topology is."""
+    p = pattern
+    _fill_mesh(w, _real(w, layout.rest), layout.cells, p.incident_start, p.incident)
     if w.capacity.springs:
         write(w, w.spring_share, layout.edge_shares)
-    p = pattern
     _fill_pattern(w, p.pair_start, p.pair_entry, p.upper, p.lower, p.diagonal)
 
 
@@ -300,3 +335,18 @@ def read_contacts(w: World, n_colliders: int, n: int) -> dict[str, np.ndarray]:
 def write_contacts(w: World, arrays: dict[str, np.ndarray]) -> None:
     """The inverse of `read_contacts`."""
     _write_contacts(w, *(np.ascontiguousarray(arrays[name]) for name in ("slip", "pressed", "touching")))
+
+
+def read_nodes(w: World, counts: Counts) -> tuple[np.ndarray, dict[str, np.ndarray]]:
+    """All that nodes go on with when the mesh changes, for `write_nodes`."""
+    state = np.empty((counts.nodes, _STATE), dtype=dtype_of(w))
+    _read_nodes(w, state)
+    return state, read_contacts(w, counts.colliders, counts.nodes)
+
+
+def write_nodes(w: World, counts: Counts, state: tuple[np.ndarray, dict[str, np.ndarray]], source: np.ndarray) -> None:
+    """Go on: node i with what node source[i] had before."""
+    numbers, contacts = state
+    _write_nodes(w, numbers, source.astype(np.int32))
+    if counts.colliders:
+        write_contacts(w, {name: values[:, source] for name, values in contacts.items()})

@@ -6,7 +6,6 @@ from convergence import box
 
 import taichifem as tf
 from taichifem.mesh.connectivity import boundary_faces, pieces
-from taichifem.mesh.splitting import Splitting
 
 SIZE = (1.0, 0.25, 0.25)
 
@@ -57,11 +56,11 @@ def watch(simulation: tf.Simulation, seconds: float) -> int:
     mass = simulation.masses.sum()
     before = {}
 
-    def remember(cells, parent):
+    def remember(parent):
         v = simulation.velocities
         before["momentum"] = (simulation.masses[:, None] * v).sum(axis=0)
         before["v"] = v[parent], simulation.positions[parent]
-        reshape(cells, parent)
+        reshape(parent)
 
     simulation._reshape = remember
     for _ in range(round(seconds / simulation.dt)):
@@ -167,12 +166,12 @@ def test_loads_keep_their_sum_when_their_nodes_are_split():
     body = tf.Body(mesh=mesh, material=material(1e9), pins=[box(upper=(1e-6, 1e3, 1e3))], **loads)
     simulation = tf.Simulation(tf.Scene(bodies=[body], gravity=(0, 0, 0)))
     before = simulation._loading.forces(lambda _: 1.0).sum(axis=0)
-    split = Splitting(simulation.cells, len(simulation.positions))
-    for node in np.flatnonzero(simulation.rest_positions[:, 0] > SIZE[0] - 1e-6).tolist():
-        star = split.star(node)
-        if len(star) > 1:
-            split.cut(node, star[: len(star) // 2])
-    simulation._reshape(split.cells, np.array(split.origin))
+    for k in range(5):
+        at_end = simulation.rest_positions[:, 0] > SIZE[0] - 1e-6
+        torn = np.flatnonzero(at_end[simulation.cells].any(axis=1))
+        across = np.repeat(np.diag([0.0, 1, 0.3])[None], len(torn), axis=0)
+        done = simulation._splitting.tear(simulation.positions, torn, across, seed=(0, k), most=1000)
+        simulation._reshape(done.parent)
     assert (simulation.rest_positions[:, 0] > SIZE[0] - 1e-6).sum() > 12
     np.testing.assert_allclose(simulation._loading.forces(lambda _: 1.0).sum(axis=0), before, rtol=1e-12, atol=1e-9)
     (handle,) = simulation._layout.handles

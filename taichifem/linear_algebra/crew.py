@@ -81,7 +81,14 @@ def _conclude(w: ti.template(), kind: ti.i32, level: ti.i32, pieces: ti.i32, tol
 
 @ti.kernel
 def _run_together(
-    w: ti.template(), workers: ti.i32, n: ti.i32, operations: ti.i32, rounds: ti.i32, tolerance: ti.f64, most: ti.i32
+    w: ti.template(),
+    workers: ti.i32,
+    n: ti.i32,
+    begin: ti.i32,
+    operations: ti.i32,
+    rounds: ti.i32,
+    tolerance: ti.f64,
+    most: ti.i32,
 ):
     ti.loop_config(serialize=True)
     for turn in range(operations * rounds):
@@ -93,7 +100,7 @@ def _run_together(
         sides = ti.min(workers, SIDES)
         for turn in range(operations * rounds):
             if w.scalar[steps.DONE] == 0:
-                operation = w.operation[turn % operations]
+                operation = w.operation[begin + turn % operations]
                 kind, level, pieces = operation[0], operation[1], operation[2]
                 for k in range(sides):
                     side = (me + k) % sides
@@ -120,11 +127,16 @@ def _run_one(w: ti.template(), n: ti.i32, kind: ti.i32, level: ti.i32, pieces: t
             _conclude(w, kind, level, pieces, tolerance, most)
 
 
-def run(w: World, n: int, program: np.ndarray, limits: Limits, *, rounds: int) -> None:
-    """Repeat the operations of the program (k,3) until the solve is done, at most `rounds` times."""
+def run(w: World, n: int, program: np.ndarray, limits: Limits, *, rounds: int, plain: bool) -> None:
+    """Repeat the operations of the program (k,3) until the solve is done, at most `rounds` times.
+
+    plain: those without levels.
+    """
+    levelled = len(program) - p.PLAIN_ROUND
+    begin, end = (levelled, len(program)) if plain else (0, levelled)
     if runtime.running_arch() == "cpu":
-        _run_together(w, runtime.threads(), n, len(program), rounds, limits.tolerance, limits.most)
+        _run_together(w, runtime.threads(), n, begin, end - begin, rounds, limits.tolerance, limits.most)
         return
     for _ in range(rounds):
-        for kind, level, pieces in program.tolist():
+        for kind, level, pieces in program[begin:end].tolist():
             _run_one(w, n, kind, level, pieces, limits.tolerance, limits.most)

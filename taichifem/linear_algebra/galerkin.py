@@ -8,6 +8,9 @@ from taichifem.structure.aggregates import Aggregates
 from taichifem.structure.levels import Levels
 from taichifem.world import DENSE, World
 
+FIRM = 0.01
+"""Size, in terms of the largest, below which a motion of an aggregate counts as one that has no stiffness."""
+
 
 @ti.func
 def arm(w: ti.template(), n: ti.i32, level: ti.i32, item: ti.i32):
@@ -36,7 +39,9 @@ def _place(w: ti.template(), position: ti.template(), of_nodes: ti.template(), g
         if ti.static(not of_nodes):
             square += w.reach[k] ** 2
     w.centre[g] = centre
-    w.reach[g] = ti.max(ti.sqrt(square / ti.cast(end - begin, w.real)), ti.cast(1e-12, w.real))
+    reach = ti.sqrt(square / ti.cast(end - begin, w.real))
+    # A single node has arms of round-off: they must not be made large.
+    w.reach[g] = reach if reach > ti.cast(1e-5, w.real) * centre.norm() else ti.cast(1.0, w.real)
 
 
 @ti.func
@@ -123,11 +128,13 @@ def _size(w: ti.template(), M):
 
 
 @ti.func
-def _firm(w: ti.template(), M):
-    """M with a diagonal that can be inverted: motions that no node can follow (all pinned, or in a line) have none."""
-    least = ti.cast(1e-6, w.real) * _size(w, M)
+def _firm(w: ti.template(), M, size):
+    """M with a diagonal that can be inverted: motions that no node can follow (all pinned, or in a line) have none.
+
+    size: of the aggregate's matrix. Shifts and turns are of one size, so that round-off of either is far below it.
+    """
     for a in ti.static(range(3)):
-        M[a, a] = ti.max(M[a, a] * (1 + ti.cast(1e-4, w.real)), least)
+        M[a, a] += ti.cast(1e-4, w.real) * ti.max(M[a, a], ti.cast(FIRM, w.real) * size)
     return M
 
 
@@ -143,10 +150,11 @@ def _invert_own(w: ti.template(), n: ti.i32, g: ti.i32):
     """The inverse of an aggregate's own matrix [[A, B], [B^T, D]], by Schur's complement of A."""
     k = w.own_block[g]
     width = w.row_start[n + 2 * g + 1] - w.row_start[n + 2 * g]
-    inverse = _inverse(w, _firm(w, w.block[k]))
+    size = ti.max(_size(w, w.block[k]), _size(w, w.block[k + width + 1]))
+    inverse = _inverse(w, _firm(w, w.block[k], size))
     B = w.block[k + 1]
     half = inverse @ B
-    rest = _inverse(w, _firm(w, w.block[k + width + 1]) - B.transpose() @ half)
+    rest = _inverse(w, _firm(w, w.block[k + width + 1], size) - B.transpose() @ half)
     across = half @ rest
     w.own_inverse[4 * g] = inverse + across @ half.transpose()
     w.own_inverse[4 * g + 1] = -across

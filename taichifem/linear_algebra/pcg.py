@@ -19,11 +19,16 @@ from taichifem.errors import Diverged
 from taichifem.linear_algebra import balance, crew, steps
 from taichifem.linear_algebra.galerkin import Galerkin
 from taichifem.linear_algebra.guess import guess
-from taichifem.linear_algebra.steps import COUNT, DONE, INDEFINITE, NOISE, RESIDUAL, SIZE, Limits
+from taichifem.linear_algebra.program import PLAIN_ROUND
+from taichifem.linear_algebra.steps import COUNT, DONE, INDEFINITE, NOISE, RESIDUAL, RZ, SIZE, Limits
 from taichifem.world import MOST_TURNS, Counts, World
 
 ROUNDS = 40
 """Iterations in one launch at most: in between, one can look whether numbers are still finite."""
+
+
+IDLE = 120
+"""Iterations that do not halve the residual: then the levels are left out."""
 
 
 @dataclass(frozen=True)
@@ -74,11 +79,15 @@ def solve(
         balance.translate(w, flying, drag_factor)
     if galerkin is not None:
         galerkin.renew(w)
-    limits, rounds = Limits(tolerance, max_iterations), min(ROUNDS, MOST_TURNS // len(program))
-    while True:
-        crew.run(w, n, program, limits, rounds=rounds)
-        if w.scalar[DONE] or not math.isfinite(w.scalar[RESIDUAL]):
-            break
+    limits = Limits(tolerance, max_iterations)
+    spent = 0
+    if galerkin is not None and not _iterate(w, n, program, limits, plain=False):
+        spent = int(w.scalar[COUNT])
+        steps.prepare(w, n, counts.pieces, noise, weight)
+        steps.begin(w, n, counts.pieces)
+        limits = Limits(tolerance, max(max_iterations - spent, 1))
+    if galerkin is None or spent:
+        _iterate(w, n, program, limits, plain=True)
     if flying:
         balance.translate(w, flying, drag_factor)
         balance.spin(w, n, counts.pieces, flying, drag_factor)
@@ -86,10 +95,30 @@ def solve(
     if not math.isfinite(residual):
         raise Diverged("the solver met a number that is not finite: take smaller time steps, or start more gently")
     return Convergence(
-        int(w.scalar[COUNT]),
+        spent + int(w.scalar[COUNT]),
         residual,
         residual <= tolerance * (1 + 1e-12),
         w.scalar[SIZE],
         w.scalar[NOISE],
         w.scalar[INDEFINITE] == 0,
     )
+
+
+def _iterate(w: World, n: int, program: np.ndarray, limits: Limits, *, plain: bool) -> bool:
+    """Go on until the solve is done. False if the levels do not help: then it can be done without.
+
+    Splinters may be so stiff and light that single precision leaves nothing of the matrices of their rigid motions.
+    """
+    length = PLAIN_ROUND if plain else len(program) - PLAIN_ROUND
+    rounds, idle, best = min(ROUNDS, MOST_TURNS // length), 0, math.inf
+    while True:
+        crew.run(w, n, program, limits, rounds=rounds, plain=plain)
+        residual = w.scalar[RESIDUAL]
+        if not plain and w.scalar[RZ] < 0:
+            return False
+        if w.scalar[DONE] or not math.isfinite(residual):
+            return True
+        idle = idle + rounds if residual > 0.5 * best else 0
+        best = min(best, residual)
+        if idle >= IDLE and not plain:
+            return False

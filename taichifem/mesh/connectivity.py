@@ -41,6 +41,17 @@ def boundary_faces(cells: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     return faces[single], single // corners
 
 
+def across(cells: np.ndarray) -> np.ndarray:
+    """The cell on the other side of the face, or edge, opposite each corner (m, d+1), or -1; of sound meshes."""
+    corners = cells.shape[1]
+    faces = cells[:, FACES if corners == 4 else SIDES].reshape(-1, corners - 1)
+    order, starts, counts = _groups(np.sort(faces, axis=1))
+    first = starts[counts == 2]
+    beside = np.full(len(faces), -1, dtype=np.int32)
+    beside[order[first]], beside[order[first + 1]] = order[first + 1] // corners, order[first] // corners
+    return beside.reshape(-1, corners)
+
+
 def overlapping(cells: np.ndarray) -> np.ndarray:
     """Counter-clockwise triangles (m, 3) that lie on the same side of an edge as another one: their numbers."""
     order, _, counts = _groups(cells[:, SIDES].reshape(-1, 2))

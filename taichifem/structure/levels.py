@@ -1,4 +1,4 @@
-"""The block matrices of all levels of the solver behind one another: which blocks there are. NumPy only.
+"""The block matrices of all levels of the solver behind one another: which blocks there are.
 
 The rows of the nodes come first. An aggregate g has two rows, n + 2 g for its shift and the next one for its turn,
 and so four blocks with each neighbour, two in either row.
@@ -11,6 +11,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from taichifem.structure.aggregates import Aggregates
+from taichifem.structure.level_kernels import stack
 from taichifem.structure.pattern import BlockPattern
 
 
@@ -34,47 +35,38 @@ class Levels:
     member: np.ndarray
     own: np.ndarray
 
+    @property
+    def apart(self) -> bool:
+        """Has no aggregate of the last level a neighbour? Then their own matrices are all there is."""
+        g, o = self.pair[self.first_pair[-2] :, :2].T
+        return bool((g == o).all())
+
 
 def stack_levels(pattern: BlockPattern, aggregates: Aggregates) -> Levels:
     """Add the Galerkin matrices of the aggregates below the matrix of the nodes."""
-    n, count = pattern.n_nodes, aggregates.count
-    parent = aggregates.parent.astype(np.int64)
-    # Of the level at hand: its pairs i <= j (numbers of nodes, or of aggregates), and their blocks.
-    i, block = pattern.row.astype(np.int64), pattern.upper.astype(np.int64)
-    j = pattern.column[block].astype(np.int64)
-    below, total = 0, pattern.n_blocks
-    starts, columns = [pattern.row_start.astype(np.int64)], [pattern.column.astype(np.int64)]
-    pairs, sizes, members, own, first_pair = [], [], [], [], [0]
-    for level in range(aggregates.levels):
-        first, end = aggregates.first[level], aggregates.first[level + 1]
-        # Numbers rise with those of the children, so here too g <= o.
-        key, pair = np.unique(parent[below + i] * count + parent[below + j], return_inverse=True)
-        g, o = np.divmod(key, count)
-        off = g != o
-        row, column = np.r_[g, o[off]], np.r_[o, g[off]]
-        by_row = np.lexsort((column, row))
-        degree = np.bincount(row - first, minlength=end - first)
-        # The blocks of each aggregate: those of its neighbours in the row of its shift, then in that of its turn.
-        begin = np.r_[0, np.cumsum(degree)][row[by_row] - first]
-        shifts = np.empty(len(row), dtype=np.int64)
-        shifts[by_row] = total + 4 * begin + 2 * (np.arange(len(row)) - begin)
-        new = np.empty(4 * len(row), dtype=np.int64)
-        for at in (shifts - total, shifts - total + 2 * degree[row - first]):
-            new[at], new[at + 1] = n + 2 * column, n + 2 * column + 1
-        columns.append(new)
-        starts.append(total + np.cumsum(np.repeat(2 * degree, 2)))
+    n, count, fine, of = pattern.n_nodes, aggregates.count, pattern.n_pairs, np.int32
+    room = fine * aggregates.levels  # no level has more pairs than the one below; what is not used costs nothing
+    first_pair, row_start = np.empty(n + count + 1, dtype=of), np.empty(n + 2 * count + 1, dtype=of)
+    first_pair[: n + 1], row_start[: n + 1] = pattern.first_pair, pattern.row_start
+    other, block, slot, cursor = (np.empty(fine + room, dtype=of) for _ in range(4))
+    other[:fine], block[:fine] = pattern.other, pattern.upper
+    column = np.empty(pattern.n_blocks + 8 * room, dtype=of)
+    column[: pattern.n_blocks] = pattern.column
+    pair, member_start, member = np.empty((room, 4), dtype=of), np.empty(room + 1, dtype=of), np.empty((room, 2), of)
+    lower, at = np.zeros(count, dtype=of), np.zeros(count, dtype=of)
+    a = aggregates
+    found = first_pair, other, block, row_start, column, pair, member_start, member
+    stack(a.first, a.begin, a.end, a.parent, *found, slot, cursor, lower, at)
 
-        mirror = shifts[: len(key)].copy()
-        mirror[off] = shifts[len(key) :]
-        pairs.append(np.column_stack([g, o, shifts[: len(key)], mirror]))
-        own.append(shifts[: len(key)][~off])
-        first_pair.append(first_pair[-1] + len(key))
-        members.append(np.column_stack([i, block])[np.argsort(pair, kind="stable")])
-        sizes.append(np.bincount(pair, minlength=len(key)))
-
-        i, j, block, below = g, o, shifts[: len(key)], n
-        total += len(new)
-    member_start = np.r_[0, np.cumsum(np.concatenate(sizes))]
-    stacked = [np.concatenate(a) for a in (starts, columns)]
-    stacked += [np.array(first_pair), np.concatenate(pairs), member_start, np.concatenate(members), np.concatenate(own)]
-    return Levels(*(array.astype(np.int32) for array in stacked))
+    first_of_level = first_pair[n + aggregates.first] - fine
+    pairs, members = int(first_of_level[-1]), int(first_pair[n + aggregates.first[-2]])
+    member_start[pairs] = members
+    return Levels(
+        row_start=row_start,
+        column=column[: row_start[-1]],
+        first_pair=first_of_level,
+        pair=pair[:pairs],
+        member_start=member_start[: pairs + 1],
+        member=member[:members],
+        own=block[first_pair[n:-1]],
+    )

@@ -1,4 +1,4 @@
-"""Which blocks of the stiffness matrix exist, and which elements add to each. NumPy and SciPy only."""
+"""Which blocks of the stiffness matrix exist, and which elements add to each."""
 
 from __future__ import annotations
 
@@ -6,6 +6,9 @@ from dataclasses import dataclass
 
 import numpy as np
 import scipy.sparse
+
+from taichifem import runtime
+from taichifem.structure import pattern_kernels as kernels
 
 PIECES = 32
 """Pieces that work on nodes or rows is cut into, at most."""
@@ -33,11 +36,12 @@ class BlockPattern:
 
     row_start (n+1,), column (blocks,): the blocks by rows.  near (n,): where in each row those begin whose mirror image
         is not stored; before them come the others, the one on the diagonal among them.
-    pair_start (pairs+1,), pair_entry: the elements that add to each pair i <= j, as
+    Pairs are neighbours i <= j, those of each i behind one another, (i, i) first.
+    first_pair (n+1,): where those of each i begin.  other, upper, lower (pairs,): j of each, and where block (i, j)
+        and block (j, i) stand; equal on the diagonal, and -1 where (j, i) is not stored.
+    pair_start (pairs+1,), pair_entry: the elements that add to each pair, as
         element * 16 + a * 4 + b with local nodes a (row i) and b (column j). Gathering them in this order
         makes sums repeat bit for bit.
-    row, upper, lower (pairs,): i of each pair, and where block (i, j) and block (j, i) stand; equal on the diagonal,
-        and -1 where (j, i) is not stored.
     diagonal (n,): where block (i, i) stands.
     incident_start (n+1,), incident: the element corners at each node, as element * 4 + a.
     pieces: how many.
@@ -46,15 +50,21 @@ class BlockPattern:
     row_start: np.ndarray
     column: np.ndarray
     near: np.ndarray
+    first_pair: np.ndarray
     pair_start: np.ndarray
     pair_entry: np.ndarray
-    row: np.ndarray
+    other: np.ndarray
     upper: np.ndarray
     lower: np.ndarray
     diagonal: np.ndarray
     incident_start: np.ndarray
     incident: np.ndarray
     pieces: int
+
+    @property
+    def row(self) -> np.ndarray:
+        """i of each pair (pairs,)."""
+        return np.repeat(np.arange(self.n_nodes, dtype=np.int32), np.diff(self.first_pair))
 
     @property
     def n_nodes(self) -> int:
@@ -69,59 +79,68 @@ class BlockPattern:
         return len(self.upper)
 
 
-def _starts(sorted_ids: np.ndarray, count: int) -> np.ndarray:
-    """First position of each id 0..count in a sorted array, and its end."""
-    return np.searchsorted(sorted_ids, np.arange(count + 1)).astype(np.int32)
-
-
 def block_pattern(cells: np.ndarray, n_nodes: int) -> BlockPattern:
     """Pattern for the cells (m,d+1) of a mesh with `n_nodes` nodes, each of which some cell uses."""
-    corners = cells.shape[1]
-    element = np.arange(len(cells), dtype=np.int64)
-    keys, entries = [], []
-    for a in range(corners):
-        for b in range(a, corners):
-            i, j = cells[:, a].astype(np.int64), cells[:, b].astype(np.int64)
-            keys.append(np.minimum(i, j) * n_nodes + np.maximum(i, j))
-            entries.append(element * 16 + np.where(i <= j, a * 4 + b, b * 4 + a))
-    key, entry = np.concatenate(keys), np.concatenate(entries)
-    order = np.lexsort((entry, key))
-    key, entry = key[order], entry[order]
-    first = np.flatnonzero(np.r_[True, key[1:] != key[:-1]])
-    i, j = np.divmod(key[first], n_nodes)
+    runtime.start()
+    corners, size, n, of = cells.shape[1], cells.size, n_nodes, np.int32
+    flat = np.ascontiguousarray(cells, dtype=of).ravel()
+    pieces = pieces_of(n, NODES)
+    piece = np.repeat(np.arange(pieces, dtype=of), np.diff(piece_starts(n, pieces)))
+    start, incident = np.zeros(n + 1, dtype=of), np.empty(size, dtype=of)
+    kernels.list_corners(corners, flat, start, incident)
 
-    pieces = pieces_of(n_nodes, NODES)
-    piece = np.repeat(np.arange(pieces), np.diff(piece_starts(n_nodes, pieces)))
-    diagonal = i == j
-    near = ~diagonal & (piece[i] == piece[j])
-    far = ~diagonal & ~near
-    pairs = np.arange(len(i))
-    row, column, pair = np.r_[i, j[far]], np.r_[j, i[far]], np.r_[pairs, pairs[far] + len(pairs)]
-    later = np.r_[near, near[far]]
-    by_row = np.lexsort((column, later, row))
-    place = np.full(2 * len(pairs), -1, dtype=np.int64)
-    place[pair[by_row]] = np.arange(len(by_row))
-    upper = place[: len(pairs)]
-    lower = np.where(diagonal, upper, place[len(pairs) :])
-    row_start = _starts(row[by_row], n_nodes)
-
-    corner = cells.ravel()
-    by_node = np.argsort(corner, kind="stable")
-    narrow = np.int32
+    j_of, adding, slot = (np.empty(corners * size, dtype=of) for _ in range(3))
+    pairs, entries, lower_far, far = (np.zeros(n, dtype=of) for _ in range(4))
+    kernels.find_pairs(corners, flat, start, incident, j_of, adding, slot, pairs, entries)
+    kernels.count_blocks(corners, start, piece, j_of, pairs, lower_far, far)
+    # Blocks of a row: those of its pairs, and of far neighbours with smaller numbers.
+    row_start, first_pair = starts_of(pairs + lower_far), starts_of(pairs)
+    near, n_pairs = row_start[:-1] + 1 + far, int(first_pair[-1])
+    first_entry = starts_of(entries)
+    pair_start, other, upper, lower = (np.empty(n_pairs + k, dtype=of) for k in (1, 0, 0, 0))
+    pair_start[first_pair] = first_entry
+    column, pair_entry = np.empty(row_start[-1], dtype=of), np.empty(first_entry[-1], dtype=of)
+    kernels.write_rows(
+        corners,
+        start,
+        incident,
+        piece,
+        j_of,
+        adding,
+        slot,
+        lower_far,
+        near,
+        row_start,
+        first_pair,
+        pair_start,
+        column,
+        other,
+        upper,
+        pair_entry,
+    )
+    kernels.write_mirrors(piece, row_start, first_pair, other, upper, column, lower, row_start[:-1].copy())
     return BlockPattern(
         row_start=row_start,
-        column=column[by_row].astype(narrow),
-        near=(row_start[1:] - np.bincount(i[near], minlength=n_nodes)).astype(narrow),
-        pair_start=np.r_[first, len(key)].astype(narrow),
-        pair_entry=entry.astype(narrow),
-        row=i.astype(narrow),
-        upper=upper.astype(narrow),
-        lower=lower.astype(narrow),
-        diagonal=upper[diagonal].astype(narrow),
-        incident_start=_starts(corner[by_node], n_nodes),
-        incident=(by_node // corners * 4 + by_node % corners).astype(narrow),
+        column=column,
+        near=near,
+        first_pair=first_pair,
+        pair_start=pair_start,
+        pair_entry=pair_entry,
+        other=other,
+        upper=upper,
+        lower=lower,
+        diagonal=upper[first_pair[:-1]],
+        incident_start=start,
+        incident=incident,
         pieces=pieces,
     )
+
+
+def starts_of(sizes: np.ndarray) -> np.ndarray:
+    """Where each part of a list begins, and the last one ends, from their sizes."""
+    starts = np.zeros(len(sizes) + 1, dtype=np.int32)
+    np.cumsum(sizes, out=starts[1:])
+    return starts
 
 
 def to_sparse(pattern: BlockPattern, blocks: np.ndarray, order: np.ndarray) -> scipy.sparse.csr_matrix:

@@ -1,0 +1,96 @@
+"""A mesh that comes apart: vertices get copies, and elements that only an edge or a vertex holds are parted.
+
+Slides 37 to 43. Elements stay as they are; only which vertices they share changes. Elements around a vertex hang
+together by faces at it, so each set of them is found by walking from one element to the next across such faces.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from taichifem import runtime
+from taichifem.mesh.connectivity import across
+from taichifem.structure.splitting_kernels import ADDED, CAPPED, SPLITS, STAMP, tear
+
+
+@dataclass(frozen=True)
+class Tear:
+    """What a step has split. capped: more would have been.
+
+    parent (n,): for every vertex the one that it was before the step.
+    """
+
+    splits: int
+    capped: bool
+    parent: np.ndarray
+
+
+class Splitting:
+    """The elements of a mesh while its vertices are split.
+
+    cells (m,d+1): vertices of the elements.  beside (m,d+1): the element across the face opposite each vertex, or -1.
+    origin (n,): for every vertex, copies included, the one it was at first.  tips (n,): at which do cracks end?
+    """
+
+    def __init__(self, cells: np.ndarray, origin: np.ndarray, tips: np.ndarray | None = None) -> None:
+        runtime.start()
+        self.cells = np.array(cells, dtype=np.int32)
+        self.beside = across(self.cells)
+        self._n = len(origin)
+        room = max(cells.size, self._n)
+        self._origin, self._tips = np.zeros(room, dtype=np.int32), np.zeros(room, dtype=np.int32)
+        self._origin[: self._n] = origin
+        if tips is not None:
+            self._tips[: self._n] = tips
+        # For the kernel: counters, marks on elements, and lists of elements, vertices, faces and groups.
+        self._counters = np.zeros(4, dtype=np.int32)
+        self._mark, self._side = np.zeros(len(cells), dtype=np.int32), np.zeros(len(cells), dtype=np.int32)
+        self._lists = np.empty((5, cells.size), dtype=np.int32)
+
+    @property
+    def origin(self) -> np.ndarray:
+        return self._origin[: self._n]
+
+    @property
+    def tips(self) -> np.ndarray:
+        return self._tips[: self._n].astype(bool)
+
+    def tear(self, x: np.ndarray, torn: np.ndarray, tensors: np.ndarray, *, seed: tuple[int, int], most: int) -> Tear:
+        """Split a vertex of each of the elements `torn`, in that order, by a plane.
+
+        x (n,3): where the vertices are [m].  tensors (len(torn),3,3): the plane lies across the direction of the
+        largest principal value of each. The vertex is one where a crack ends, if the element has one, so that cracks
+        run on instead of crumbling; else a random one, told by `seed`. Elements with no vertex whose elements the
+        plane parts stay, and those around a vertex that was split wait: their stress is another one now.
+        most: splits at most.
+        """
+        corners, before = self.cells.shape[1], self._n
+        parent = np.zeros(len(self._origin), dtype=np.int32)
+        parent[:before] = np.arange(before)
+        where = np.zeros((len(self._origin), 3))
+        where[:before] = x
+        self._counters[:SPLITS] = before, self._counters[STAMP]
+        self._counters[SPLITS:] = 0
+        with runtime.precision_of("f64"):
+            tear(
+                corners,
+                self.cells.reshape(-1),
+                self.beside.reshape(-1),
+                self._origin,
+                parent,
+                self._tips,
+                where,
+                np.ascontiguousarray(torn, dtype=np.int32),
+                np.ascontiguousarray(tensors, dtype=np.float64),
+                np.zeros(len(self.cells), dtype=np.int32),
+                self._mark,
+                self._side,
+                *self._lists,
+                self._counters,
+                *(int(s) & 0x7FFFFFFF for s in seed),
+                most,
+            )
+        self._n = int(self._counters[ADDED])
+        return Tear(int(self._counters[SPLITS]), bool(self._counters[CAPPED]), parent[: self._n])
