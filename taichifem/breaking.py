@@ -63,19 +63,13 @@ class BreakingBodies(Bodies):
     def _break(self, step: int) -> bool:
         """Split what is torn beyond its toughness; did anything part? step: number of the step, for the seed."""
         self.splits, self.more_splits = 0, False
-        self._measure()
-        with self._kernels():
-            fracture.find_tension(self._world, self._counts.elements)
-        toughness = [m.fracture.toughness if m.fracture else np.inf for m in self._materials]
-        excess = self._read(self._world.energy) / self._given_cells(np.array(toughness)[self._layout.cell_materials])
-        torn = np.flatnonzero(excess > 1)
-        if not len(torn):
+        torn = self._find_torn()
+        if not len(torn.place):
             return False
         broken = fracture.propagate(
             self.cells,
             self.positions,
-            self._read(self._world.stress),
-            torn[np.argsort(-excess[torn], kind="stable")],
+            torn,
             self._tips,
             rng=np.random.default_rng([self.scene.seed, step]),
             most=self.scene.max_splits,
@@ -86,6 +80,24 @@ class BreakingBodies(Bodies):
         self._reshape(broken.split.cells, np.array(broken.split.origin))
         self._tips = broken.tips
         return True
+
+    def _find_torn(self) -> fracture.Torn:
+        """What is torn beyond its toughness now."""
+        w, n, m = self._world, self._counts.nodes, self._counts.elements
+        criteria = [material.fracture for material in self._materials if material.fracture]
+        used = {criterion.criterion for criterion in criteria}
+        self._measure()
+        with self._kernels():
+            for done in range(max((criterion.smoothing for criterion in criteria), default=0)):
+                fracture.average(w, n, m, done)
+            if "principal-stress" in used:
+                fracture.find_tension(w, m)
+            if "separation-tensor" in used:
+                fracture.find_separation(w, n, m)
+        tension = self._read(w.energy) if "principal-stress" in used else np.zeros(0)
+        parting = self._read(w.parting) if "separation-tensor" in used else np.zeros((0, 4))
+        stress = self._read(w.stress) if (tension > 1).any() else np.zeros((len(tension), 3, 3))
+        return fracture.Torn.of(tension, stress, parting)
 
     def _reshape(self, cells: np.ndarray, parent: np.ndarray) -> None:
         """Go on with the elements `cells`; parent (n,): the present node that each node is, or is a copy of."""

@@ -249,7 +249,7 @@ def fill_levels(
 
 
 def fill_table(w: World, table: np.ndarray, body_start: np.ndarray, body_flies: np.ndarray) -> None:
-    """Material rows (materials,12), node ranges of the bodies, and how each flies (`linear_algebra.balance`)."""
+    """Material rows (materials,15), node ranges of the bodies, and how each flies (`linear_algebra.balance`)."""
     _fill_table(w, _real(w, table), body_start, body_flies.astype(np.int32))
 
 

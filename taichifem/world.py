@@ -138,6 +138,9 @@ class World:
         self.mass, self.drag = self._scalar(n), self._scalar(n)
         self.force = self._vector(n, 3)  # elastic force [N]
         self.load = self._vector(n, 3)  # right-hand side of the step, without contact and handles [N s]
+        self.around = self._matrix(n, 3, 3)  # mean stress of the elements around [Pa]
+        # Normal of the plane across which a node comes apart, and how far beyond its toughness (`processes.fracture`).
+        self.parting = self._vector(n, 4)
         self.incident_start = self._scalar(n + 1, ti.i32)
         self.incident = self._scalar(4 * self.capacity.elements, ti.i32)
 
@@ -164,7 +167,7 @@ class World:
         k = m if self.capacity.springs and self.capacity.plastic else 1
         self.spring_growth, self.spring_hardened = self._vector(k, springs), self._vector(k, springs)
         # Material table: the columns are those of `elements`.
-        self.table = self._vector(self.capacity.materials, 12)
+        self.table = self._vector(self.capacity.materials, 15)
 
     def _place_matrix(self) -> None:
         c = self.capacity
