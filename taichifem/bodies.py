@@ -58,8 +58,13 @@ class Bodies:
     def _take(self, layout: Layout) -> None:
         """Take a layout, and work out all that follows from its mesh."""
         self._layout = layout
-        self._pattern: BlockPattern = block_pattern(layout.cells, len(layout.rest))
         self._loading = Loading(layout)
+        self._plan_matrix(layout.cells)
+
+    def _plan_matrix(self, cells: np.ndarray) -> None:
+        """Work out which blocks the matrix of some cells (k,d+1) has, and how it is solved."""
+        layout = self._layout
+        self._pattern: BlockPattern = block_pattern(cells, len(layout.rest))
         self._levels: Levels = stack_levels(self._pattern, layout.aggregates)
         self._galerkin = Galerkin(layout.aggregates, self._levels) if self.scene.solver == "multilevel" else None
         self._program = write_program(
@@ -71,16 +76,26 @@ class Bodies:
         self._fill_topology()
         with self._kernels():
             transfer.fill(self._world, self._layout)
+            if self._laws.springs:
+                # Of the stiffness of an edge as it was before anything split.
+                transfer.write(self._world, self._world.spring_share, self._whole.edge_shares)
 
     def _fill_topology(self) -> None:
         """Give the world what follows from the mesh."""
         layout, pattern = self._layout, self._pattern
         self._counts.nodes, self._counts.elements = len(layout.rest), len(layout.cells)
+        with self._kernels():
+            transfer.fill_mesh(self._world, layout, pattern)
+        self._fill_matrix()
+        self._surroundings = Surroundings(self.scene, layout, self._world, self._counts)
+
+    def _fill_matrix(self) -> None:
+        """Give the world what the solver has to know of the matrix."""
+        pattern = self._pattern
         self._counts.pairs, self._counts.pieces = pattern.n_pairs, pattern.pieces
         with self._kernels():
-            transfer.fill_topology(self._world, layout, pattern)
-            transfer.fill_levels(self._world, pattern, self._levels, layout.aggregates, self._program)
-        self._surroundings = Surroundings(self.scene, layout, self._world, self._counts)
+            transfer.fill_pattern(self._world, pattern)
+            transfer.fill_levels(self._world, pattern, self._levels, self._layout.aggregates, self._program)
 
     def _kernels(self):
         """Around every use of the fields: the right precision, and fields that still exist."""
@@ -251,7 +266,7 @@ class Bodies:
         pattern = self._pattern
         with self._kernels():
             self._laws.deform(self._world, self._counts, stiffness=1.0, due=self._due, projected=projected)
-            assembly.assemble(self._world, self._counts.pairs, 0.0, 0.0)
+            assembly.assemble(self._world, self._counts.pairs, self._counts.elements, 0.0, 0.0)
             blocks = transfer.read(self._world, self._world.block, pattern.n_blocks).astype(np.float64)
         return to_sparse(pattern, blocks, self._layout.node_order)
 

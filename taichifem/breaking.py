@@ -79,19 +79,15 @@ class BreakingBodies(Bodies):
     def _break(self, step: int) -> bool:
         """Split what is torn beyond its toughness; did anything part? step: number of the step, for the seed."""
         self.splits, self.more_splits = 0, False
-        self._measure()
-        with self._kernels():
-            fracture.find_tension(self._world, self._counts.elements)
-        toughness = [m.fracture.toughness if m.fracture else np.inf for m in self._materials]
-        excess = self._read(self._world.energy) / self._given_cells(np.array(toughness)[self._layout.cell_materials])
-        torn = np.flatnonzero(excess > 1)
-        if not len(torn):
+        torn = self._find_torn()
+        if not len(torn.element):
             return False
-        torn = torn[np.argsort(-excess[torn], kind="stable")]
+        order = self._layout.cell_order
         done = self._splitting.tear(
             self.positions,
-            torn,
-            self._read(self._world.stress)[torn],
+            order[torn.element],
+            torn.corner,
+            torn.normal,
             seed=(self.scene.seed, step),
             most=self.scene.max_splits,
         )
@@ -99,6 +95,12 @@ class BreakingBodies(Bodies):
         if done.splits:
             self._reshape(done.parent)
         return done.splits > 0
+
+    def _find_torn(self) -> fracture.Torn:
+        self._measure()
+        criteria = [material.fracture for material in self._materials if material.fracture]
+        with self._kernels():
+            return fracture.find_torn(self._world, self._counts, criteria)
 
     def _reshape(self, parent: np.ndarray) -> None:
         """Go on with the elements as they are split; parent (n,): the present node that each is, or is a copy of."""

@@ -8,9 +8,10 @@ from taichifem.formulas import hooke, rotation
 from taichifem.runtime import ti
 
 LAMBDA, MU, MASS_DAMPING, STIFFNESS_DAMPING, DENSITY, MODEL, SPRING, PLASTICITY, LIMIT, SLOPE, RATE, PRESSED = range(12)
+TOUGHNESS, CRITERION, SMOOTHING = range(12, 15)
 """Columns of the material table. SPRING: stiffness [N/m] given for the springs along edges, or 0. From PLASTICITY on:
 the kind of law (`formulas.plasticity`) and its yield stress, hardening and viscosity, or for creep yield strain,
-most plastic strain and rate; PRESSED: the limit of springs under pressure."""
+most plastic strain and rate; PRESSED: the limit of springs under pressure. CRITERION: see `processes.fracture`."""
 
 LINEAR, COROTATIONAL, QUICK, SPRINGS, YIELDING_LINEAR, YIELDING, YIELDING_GREEN, FIRST_LAW = range(8)
 """What MODEL may be: up to QUICK (corotational by QR) they have the fast road below; SPRINGS are in

@@ -7,6 +7,7 @@ from dataclasses import dataclass
 
 from taichifem import elements, flowing_elements, isotropic_elements, spring_elements, yielding_elements
 from taichifem.description import Material
+from taichifem.description.fracture import CRITERIA
 from taichifem.description.material import PLASTICITIES
 from taichifem.formulas.models import MODELS, invertible
 from taichifem.world import Counts, World
@@ -15,7 +16,7 @@ ROTATION_ITERATIONS = 400
 """A bound that only nearly degenerate inverted elements come near: one or two iterations are usual."""
 
 ENDLESS = 1e30
-"""Bound of a strain that has none."""
+"""Bound of a strain or a stress that has none."""
 
 FAST = {elements.LINEAR, elements.COROTATIONAL, elements.QUICK}
 YIELDING = {elements.YIELDING_LINEAR, elements.YIELDING, elements.YIELDING_GREEN}
@@ -90,7 +91,10 @@ class Laws:
             flow = [m.yield_strain, m.max_plastic_strain or ENDLESS, m.creep_rate]
         elastic = [m.lame_lambda, m.shear_modulus, m.mass_damping, m.stiffness_damping, m.density]
         pressed = m.compression_limit or flow[0]
-        return [*elastic, float(self.number(m)), m.spring_stiffness or 0.0, float(kind), *flow, pressed]
+        broken = [ENDLESS, 0.0, 0.0]
+        if m.fracture:
+            broken = [m.fracture.toughness, float(CRITERIA.index(m.fracture.criterion)), float(m.fracture.smoothing)]
+        return [*elastic, float(self.number(m)), m.spring_stiffness or 0.0, float(kind), *flow, pressed, *broken]
 
     @property
     def springs(self) -> bool:

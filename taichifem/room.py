@@ -41,7 +41,25 @@ def room_for(
         springs=laws.springs,
         plastic=laws.plastic,
     )
-    return _broken(capacity, layout) if any(m.fracture for m in layout.materials) else capacity
+    if any(m.fracture for m in layout.materials):
+        capacity = _broken(capacity, layout)
+    return _meeting(capacity, layout) if scene.pieces_meet else capacity
+
+
+def _meeting(apart: Capacity, layout: Layout) -> Capacity:
+    """Springs between half as many pairs of nodes and faces as there are elements, each of which makes three pairs."""
+    springs = max(64, len(layout.cells) // 2)
+    coarse = apart.coarse_pairs + 3 * springs * (layout.aggregates.levels + 1)
+    return replace(
+        apart,
+        blocks=apart.blocks + 6 * springs,
+        pairs=apart.pairs + 3 * springs,
+        coarse_blocks=8 * coarse,
+        coarse_pairs=coarse,
+        members=apart.members + 3 * springs * (layout.aggregates.levels + 1),
+        operations=most_operations(layout.aggregates.levels + 1),
+        meetings=springs,
+    )
 
 
 def _broken(whole: Capacity, layout: Layout) -> Capacity:

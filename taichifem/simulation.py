@@ -10,12 +10,12 @@ from dataclasses import asdict
 import numpy as np
 
 from taichifem import checkpoint, transfer
-from taichifem.breaking import BreakingBodies
 from taichifem.clock import Clock
 from taichifem.description import Collider, Load, Material, Scene
 from taichifem.errors import Diverged, InputError
 from taichifem.integrators import ADVANCE, implicit, symplectic_euler
 from taichifem.integrators.step import Options, Step, StepReport
+from taichifem.meeting_bodies import MeetingBodies
 from taichifem.state import element_fields, node_fields
 from taichifem.stats import Stats, figures
 from taichifem.supports import check_supports
@@ -25,7 +25,7 @@ STATIC_TOLERANCE, STATIC_ITERATIONS = 1e-6, 50_000
 """Of the linear solver in a static solve: the stiffness matrix alone is far worse conditioned than a step's."""
 
 
-class Simulation(BreakingBodies):
+class Simulation(MeetingBodies):
     """The state of a scene over time. Arrays in and out are NumPy, float64, SI units; z points up.
 
     precision: "f32" (real time) or "f64".  arch, threads: as `taichifem.runtime.start`; None keeps what runs.
@@ -94,6 +94,8 @@ class Simulation(BreakingBodies):
         with self._timer.phase("set-up"):
             self._surround(self._clock.end, self.dt)
             self._put_loads(self._clock.end)
+        with self._timer.phase("contact"):
+            self._meet(self.dt)
         self._gravity = np.asarray(self.scene.gravity, dtype=float)
         self._advance()
         self._clock.tick()

@@ -263,12 +263,14 @@ def fill(w: World, layout: Layout) -> None:
     _fill_elements(w, indices, _real(w, layout.gradients), _real(w, layout.volumes))
 
 
-def fill_topology(w: World, layout: Layout, pattern: BlockPattern) -> None:
-    """Everything that is fixed while the topology is."""
+def fill_mesh(w: World, layout: Layout, pattern: BlockPattern) -> None:
+    """Rest shape and elements, and which corners meet at each node."""
+    _fill_mesh(w, _real(w, layout.rest), layout.cells, pattern.incident_start, pattern.incident)
+
+
+def fill_pattern(w: World, pattern: BlockPattern) -> None:
+    """Which blocks the matrix has, and what adds to them."""
     p = pattern
-    _fill_mesh(w, _real(w, layout.rest), layout.cells, p.incident_start, p.incident)
-    if w.capacity.springs:
-        write(w, w.spring_share, layout.edge_shares)
     _fill_pattern(w, p.pair_start, p.pair_entry, p.upper, p.lower, p.diagonal)
 
 
@@ -284,7 +286,7 @@ def fill_levels(
 
 
 def fill_table(w: World, table: np.ndarray, body_start: np.ndarray, body_flies: np.ndarray) -> None:
-    """Material rows (materials,12), node ranges of the bodies, and how each flies (`linear_algebra.balance`)."""
+    """Material rows (materials,15), node ranges of the bodies, and how each flies (`linear_algebra.balance`)."""
     _fill_table(w, _real(w, table), body_start, body_flies.astype(np.int32))
 
 
@@ -317,6 +319,19 @@ def read(w: World, field, n: int) -> np.ndarray:
 def write(w: World, field, array: np.ndarray) -> None:
     """Set the first entries of a scalar, vector or matrix field from (n), (n,k) or (n,k,l)."""
     _write(field, _real(w, array), len(array))
+
+
+def read_integers(field, n: int) -> np.ndarray:
+    """The first n entries of a field of integers (n,) or vectors of them (n,k)."""
+    target = np.empty((n, field.n)[: 1 + _rank(field)], dtype=np.int32)
+    if n:
+        _read(field, target, n)
+    return target
+
+
+def write_integers(field, array: np.ndarray) -> None:
+    """Set the first entries of a field of integers."""
+    _write(field, np.ascontiguousarray(array, dtype=np.int32), len(array))
 
 
 def read_contacts(w: World, n_colliders: int, n: int) -> dict[str, np.ndarray]:

@@ -55,12 +55,13 @@ class Capacity:
     coarse_pairs: int = 1
     members: int = 1
     operations: int = 1
+    meetings: int = 1  # springs between pieces
     dimension: int = 3  # of the elements: 3 for tetrahedra, 2 for triangles in the plane y = 0
     tangents: bool = False  # do elements store their stiffness blocks? Isotropic laws and springs need it
     springs: bool = False  # are there elements made of springs?
     plastic: bool = False  # are there plastic materials?
 
-    LEAST = (256, 1024, 4096, 2048, 8, 4, 256, 256, 8, 8, 32, 1024, 256, 1024, 64)
+    LEAST = (256, 1024, 4096, 2048, 8, 4, 256, 256, 8, 8, 32, 1024, 256, 1024, 64, 1)
 
     def rounded(self) -> Capacity:
         """The capacity class: every count rounded up to a power of two."""
@@ -80,6 +81,7 @@ class Counts:
     bodies: int = 0
     flying: int = 0  # bodies that no pin holds
     colliders: int = 0
+    meetings: int = 0  # springs between pieces
     held: int = 0
     pulled: int = 0
     sprung: bool = True  # may some springs of handles or contact be left from the last step?
@@ -112,6 +114,7 @@ class World:
         self._place_matrix()
         self._place_coarse()
         self._place_surroundings()
+        self._place_meetings()
         self._builder.finalize()
 
     def _scalar(self, size: int, dtype=None):
@@ -138,6 +141,9 @@ class World:
         self.mass, self.drag = self._scalar(n), self._scalar(n)
         self.force = self._vector(n, 3)  # elastic force [N]
         self.load = self._vector(n, 3)  # right-hand side of the step, without contact and handles [N s]
+        self.around = self._matrix(n, 3, 3)  # mean stress of the elements around [Pa]
+        # Normal of the plane across which a node comes apart, and how far beyond its toughness (`processes.fracture`).
+        self.parting = self._vector(n, 4)
         self.incident_start = self._scalar(n + 1, ti.i32)
         self.incident = self._scalar(4 * self.capacity.elements, ti.i32)
 
@@ -164,7 +170,7 @@ class World:
         k = m if self.capacity.springs and self.capacity.plastic else 1
         self.spring_growth, self.spring_hardened = self._vector(k, springs), self._vector(k, springs)
         # Material table: the columns are those of `elements`.
-        self.table = self._vector(self.capacity.materials, 12)
+        self.table = self._vector(self.capacity.materials, 15)
 
     def _place_matrix(self) -> None:
         c = self.capacity
@@ -175,7 +181,7 @@ class World:
         self.block = self._matrix(blocks, 3, 3)
         self.pair_start, self.pair_entry = (
             self._scalar(c.pairs + 1, ti.i32),
-            self._scalar(self.corner_pairs * c.elements, ti.i32),
+            self._scalar(self.corner_pairs * c.elements + (10 * c.meetings if c.meetings > 1 else 0), ti.i32),
         )
         self.upper, self.lower = self._scalar(c.pairs, ti.i32), self._scalar(c.pairs, ti.i32)
         self.diagonal = self._scalar(c.nodes, ti.i32)
@@ -235,6 +241,23 @@ class World:
         self.touching = ti.field(ti.i32)
         self._builder.dense(ti.ij, (k, c.nodes)).place(self.slip)
         self._builder.dense(ti.ij, (k, c.nodes)).place(self.pressed, self.touching)
+
+    def _place_meetings(self) -> None:
+        """For contact between pieces (`processes.meeting`), where there may be any."""
+        k = self.capacity.meetings
+        meet = k > 1
+        n, m = (self.capacity.nodes, self.capacity.elements) if meet else (1, 1)
+        # The element across the face opposite each corner, or -1; which piece an element is of.
+        self.beside, self.piece = self._vector(m, self.corners, ti.i32), self._scalar(m, ti.i32)
+        self.outward, self.entered = self._vector(n, 3), self._scalar(n, ti.i32)
+        # The hash: nodes, sorted by bucket.
+        self.bucket_start, self.bucket_node = self._scalar(2 * n + 1, ti.i32), self._scalar(n, ti.i32)
+        # Springs: a node and a face, shares, the face's normal, stiffness along and across it [N/m], gap at rest [m].
+        self.meeting_cell, self.meeting_weight = self._vector(k, 4, ti.i32), self._vector(k, 4)
+        self.meeting_normal, self.meeting_stiffness = self._vector(k, 3), self._vector(k, 2)
+        self.meeting_gap = self._scalar(k)
+        self.meetings, self.friction = ti.field(ti.i32), ti.field(self.real)
+        self._builder.place(self.meetings, self.friction)
 
 
 _free: dict[tuple, list[World]] = {}

@@ -48,3 +48,12 @@ def assert_derivatives(simulation: tf.Simulation, x: np.ndarray, d: np.ndarray, 
     slope = (force_down - force_up).ravel() / (2 * h)
     if tangent:
         np.testing.assert_allclose(product, slope, atol=1e-6 * np.abs(slope).max())
+
+
+def tear(simulation, elements: np.ndarray, normal, *, seed: int) -> None:
+    """Split a vertex of each of some elements of a simulation that may break, by a plane of this normal."""
+    any_corner, normals = np.full(len(elements), -1), np.tile(normal, (len(elements), 1))
+    done = simulation._splitting.tear(
+        simulation.positions, elements, any_corner, normals, seed=(seed, 0), most=len(elements)
+    )
+    simulation._reshape(done.parent)

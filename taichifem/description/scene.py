@@ -140,6 +140,8 @@ class Scene:
     suits soft or tiny scenes at best and is there for comparison.
     tolerance: relative residual at which the linear solver stops.  max_iterations: its cap, told when hit.
     newton_tolerance: size of the out-of-balance force, relative to the first, at which Newton's method stops.
+    body_contact: do bodies, and pieces of them, keep out of each other? None: where some may break. Not in the plane,
+    and not with "symplectic-euler" and "quasi-static".  body_friction: coefficient of Coulomb's friction between them.
     seed: of what is random, which is how cracks begin.  max_splits: of vertices in a step, told when hit.
     """
 
@@ -154,6 +156,8 @@ class Scene:
     tolerance: float = 1e-3
     max_iterations: int = 2000
     newton_tolerance: float = 1e-6
+    body_contact: bool | None = None
+    body_friction: float = 0.5
     seed: int = 0
     max_splits: int = 100
     name: str = "scene"
@@ -178,13 +182,36 @@ class Scene:
         check.number("tolerance", self.tolerance, above=0, below=1)
         check.whole("max_iterations", self.max_iterations)
         check.number("newton_tolerance", self.newton_tolerance, above=0, below=1)
+        check.number("body_friction", self.body_friction, at_least=0)
         check.whole("seed", self.seed, at_least=0)
         check.whole("max_splits", self.max_splits)
-        materials = [m for body in self.bodies for m in (body.material, *body.materials.values())]
-        if self.integrator == "quasi-static" and any(m.fracture for m in materials):
+        if self.integrator == "quasi-static" and self.breaks:
             raise InputError(
                 'integrator "quasi-static" has no inertia, and pieces that come off need it: choose another'
             )
+
+        if self.body_contact and self._without_contact:
+            raise InputError(f"body_contact is not there {self._without_contact}: leave it out")
+
+    @property
+    def _without_contact(self) -> str:
+        """Why bodies cannot keep out of each other; empty if they can."""
+        if self.bodies[0].mesh.dimension == 2:
+            return "for planar bodies"
+        if self.integrator in ("symplectic-euler", "quasi-static"):
+            return f'with integrator "{self.integrator}"'
+        return ""
+
+    @property
+    def breaks(self) -> bool:
+        """Is there a material that breaks?"""
+        return any(m.fracture for body in self.bodies for m in (body.material, *body.materials.values()))
+
+    @property
+    def pieces_meet(self) -> bool:
+        """Do bodies, and pieces of them, keep out of each other?"""
+        wanted = self.breaks if self.body_contact is None else self.body_contact
+        return wanted and not self._without_contact
 
     @classmethod
     def from_file(cls, path: str, *, overrides: Sequence[str] = ()) -> Scene:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 
+from taichifem import meeting_elements
 from taichifem.integrators.step import Step, StepReport
 from taichifem.linear_algebra.pcg import Convergence
 from taichifem.processes import contact, holding
@@ -50,11 +51,14 @@ def settle(
 def springs(step: Step, h: float) -> int:
     """Handles and contacts for the solution so far; how many contacts changed."""
     w, counts = step.w, step.counts
-    if not (counts.pulled or counts.colliders or counts.sprung):
+    acting = bool(counts.pulled or counts.colliders or counts.meetings)
+    if not (acting or counts.sprung):
         return 0
-    counts.sprung = bool(counts.pulled or counts.colliders)
+    counts.sprung = acting
     holding.clear_springs(w, counts.nodes)
     holding.pull(w, counts.pulled, h)
+    if counts.meetings:
+        meeting_elements.push(w, counts.meetings, h)
     return contact.touch(w, counts.nodes, counts.colliders, h, step.dt) if counts.colliders else 0
 
 

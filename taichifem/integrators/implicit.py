@@ -122,7 +122,9 @@ def solve(step: Step, *, h: float, newton: int, inertia: bool = True) -> StepRep
     newton: most linearisations; 1 is the linearly implicit method.
     """
     w, n = step.w, step.counts.nodes
-    counts = step.counts if inertia else replace(step.counts, flying=0)
+    # What presses on a body from another one stands in the matrix: such bodies do not fly.
+    flies = inertia and not step.counts.meetings
+    counts = step.counts if flies else replace(step.counts, flying=0)
     weight = float(np.linalg.norm(step.gravity)) * h if inertia else ALWAYS
     noise = float(np.finfo(np.float32 if w.precision == "f32" else np.float64).eps) / h
     report, first = StepReport(balanced=newton == 1), 0.0
@@ -144,7 +146,7 @@ def solve(step: Step, *, h: float, newton: int, inertia: bool = True) -> StepRep
 
     def solve_step() -> pcg.Convergence:
         with step.timer.phase("assembly"):
-            assembly.assemble(w, counts.pairs, float(inertia), h * inertia)
+            assembly.assemble(w, counts.pairs, counts.elements, float(inertia), h * inertia)
         return settle(step, h, report, solve_linear, weight=weight / h if inertia else 0.0)
 
     exact = False

@@ -23,7 +23,7 @@ ROWS, PARENTS = 16, 8
 
 def most_operations(levels: int) -> int:
     """How many operations a round has at most, with this many levels of aggregates."""
-    most = 1
+    most = 2
     for _ in range(levels):
         most = 2 * (3 + most) + 2
     return most + 3 + PLAIN_ROUND
@@ -42,7 +42,8 @@ def write_program(pattern: BlockPattern, aggregates: Aggregates, *, solver: str,
     def visit(level: int) -> list[tuple[int, int, int]]:
         """Improve the solution of a level, whose first smoothing is done, by way of those above."""
         if level == last:
-            return [(LAST, last, 1)]
+            items = pieces_of(counts[last], ROWS)
+            return [(LAST, last, 1)] if solved else [(LEAVE, last, items), (SMOOTH, last, items)]
         # Twice, where what is above is not solved exactly: one visit leaves too much of long waves.
         visits = 1 if level == 0 or (level + 1 == last and solved) else 2
         items = fine if level == 0 else pieces_of(counts[level], ROWS)

@@ -39,7 +39,7 @@ def _gap(w: ti.template(), c: ti.i32, start, end):
 
 
 @ti.func
-def _spring(w: ti.template(), i: ti.i32, h):
+def stiffness(w: ti.template(), i: ti.i32, h):
     """Stiffness [N/m] of the contact springs of node i."""
     inertia = 1 / (h * h)
     own = w.contact_stiffness[i]
@@ -57,7 +57,7 @@ def _state(w: ti.template(), c: ti.i32, i: ti.i32, h, dt, velocity):
     force = ti.cast(0.0, w.real)
     stretch = ti.Vector.zero(w.real, 3)
     if distance < 0:
-        k = _spring(w, i, h)
+        k = stiffness(w, i, h)
         force = -k * distance
         surface = w.collider_velocity[c] + w.collider_spin[c].cross(position - w.collider_center[c])
         stretch = w.slip[c, i] + ((w.base_x[i] - w.x0[i]) + h * velocity - dt * surface)
@@ -84,7 +84,7 @@ def touch(w: ti.template(), n: ti.i32, n_colliders: ti.i32, h: ti.f64, dt: ti.f6
                 w.touching[c, i] = state
                 changed += 1
             if state != NONE:
-                k = _spring(w, i, step)
+                k = stiffness(w, i, step)
                 # Where it slips, a spring as soft as gives the force mu N: it opposes the motion, and cannot
                 # throw the node back. With N held fixed these springs majorise the friction potential, which is
                 # convex, so solving again descends.
@@ -92,13 +92,13 @@ def touch(w: ti.template(), n: ti.i32, n_colliders: ti.i32, h: ti.f64, dt: ti.f6
                 if state == SLIPS:
                     side = w.collider_friction[c] * w.pressed[c, i] / stretch.norm()
                 along = normal.outer_product(normal)
-                stiffness = (k - side) * along + side * ti.Matrix.identity(w.real, 3)
+                springs = (k - side) * along + side * ti.Matrix.identity(w.real, 3)
                 if ti.static(w.d == 2):
-                    stiffness[1, 1] = 0.0
+                    springs[1, 1] = 0.0
                 w.sprung[i] = 1
-                w.spring[i] += step * step * stiffness
+                w.spring[i] += step * step * springs
                 # Both forces are written for dv = 0: what `dv` adds to them stands in the matrix.
-                w.spring_load[i] += step * (force * normal - side * stretch + step * (stiffness @ w.dv[i]))
+                w.spring_load[i] += step * (force * normal - side * stretch + step * (springs @ w.dv[i]))
     return changed
 
 
@@ -128,7 +128,7 @@ def slide(w: ti.template(), n: ti.i32, n_colliders: ti.i32, h: ti.f64, dt: ti.f6
         for c in range(n_colliders):
             state, force, _, stretch = _state(w, c, i, step, whole, w.v[i])
             most = w.collider_friction[c] * force
-            held = _spring(w, i, step) * stretch.norm()
+            held = stiffness(w, i, step) * stretch.norm()
             if held > most:
                 stretch *= most / held
             w.touching[c, i] = state

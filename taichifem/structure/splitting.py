@@ -57,17 +57,26 @@ class Splitting:
     def tips(self) -> np.ndarray:
         return self._tips[: self._n].astype(bool)
 
-    def tear(self, x: np.ndarray, torn: np.ndarray, tensors: np.ndarray, *, seed: tuple[int, int], most: int) -> Tear:
-        """Split a vertex of each of the elements `torn`, in that order, by a plane.
+    def tear(
+        self,
+        x: np.ndarray,
+        elements: np.ndarray,
+        corners: np.ndarray,
+        normals: np.ndarray,
+        *,
+        seed: tuple[int, int],
+        most: int,
+    ) -> Tear:
+        """Split a vertex of each of some elements, in that order, by a plane.
 
-        x (n,3): where the vertices are [m].  tensors (len(torn),3,3): the plane lies across the direction of the
-        largest principal value of each. The vertex is one where a crack ends, if the element has one, so that cracks
-        run on instead of crumbling; else a random one, told by `seed`. Elements with no vertex whose elements the
-        plane parts stay, and those around a vertex that was split wait: their stress is another one now.
-        most: splits at most.
+        x (n,3): where the vertices are [m].  elements (k,).  corners (k,): which vertex; -1 for one where a crack ends,
+        if the element has one, so that cracks run on instead of crumbling, else a random one, told by `seed`.
+        normals (k,3): of the plane through it.  most: splits at most.
+        Where the plane does not part the elements around the vertex, nothing happens. What has an element around a
+        vertex that was split waits: its stress is another one now.
         """
-        corners, before = self.cells.shape[1], self._n
-        parent = np.zeros(len(self._origin), dtype=np.int32)
+        of, before = np.int32, self._n
+        parent = np.zeros(len(self._origin), dtype=of)
         parent[:before] = np.arange(before)
         where = np.zeros((len(self._origin), 3))
         where[:before] = x
@@ -75,16 +84,17 @@ class Splitting:
         self._counters[SPLITS:] = 0
         with runtime.precision_of("f64"):
             tear(
-                corners,
+                self.cells.shape[1],
                 self.cells.reshape(-1),
                 self.beside.reshape(-1),
                 self._origin,
                 parent,
                 self._tips,
                 where,
-                np.ascontiguousarray(torn, dtype=np.int32),
-                np.ascontiguousarray(tensors, dtype=np.float64),
-                np.zeros(len(self.cells), dtype=np.int32),
+                np.ascontiguousarray(elements, dtype=of),
+                np.ascontiguousarray(corners, dtype=of),
+                np.ascontiguousarray(normals, dtype=np.float64),
+                np.zeros(len(self.cells), dtype=of),
                 self._mark,
                 self._side,
                 *self._lists,

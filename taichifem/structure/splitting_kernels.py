@@ -3,7 +3,6 @@
 `cells` and `beside` are flat, with `corners` numbers an element.
 """
 
-from taichifem.formulas.eigen import symmetric_eigen
 from taichifem.runtime import ti
 
 ADDED, STAMP, SPLITS, CAPPED = range(4)
@@ -179,8 +178,9 @@ def tear(
     parent: _list,
     tips: _list,
     where: ti.types.ndarray(ndim=2),
-    torn: _list,
-    tensors: ti.types.ndarray(ndim=3),
+    elements: _list,
+    corner: _list,
+    normals: ti.types.ndarray(ndim=2),
     waits: _list,
     mark: _list,
     side: _list,
@@ -196,21 +196,18 @@ def tear(
 ):
     """See `Splitting.tear`. queue, around, faces, touched, starts: scratch."""
     ti.loop_config(serialize=True)
-    for t in range(torn.shape[0]):
-        e = torn[t]
-        if waits[e] == 0 and counters[SPLITS] == most:
+    for t in range(elements.shape[0]):
+        e, waiting = elements[t], waits[elements[t]]
+        if corner[t] >= 0:
+            counters[STAMP] = counters[STAMP] + 1
+            vertex = cells[corners * e + corner[t]]
+            count = _walk(corners, cells, beside, mark, around, counters[STAMP], e, vertex, 0)
+            for k in range(count):
+                waiting |= waits[around[k]]
+        if waiting == 0 and counters[SPLITS] == most:
             counters[CAPPED] = 1
-        if waits[e] == 0 and counters[CAPPED] == 0:
-            S = ti.Matrix([[tensors[t, a, b] for b in range(3)] for a in range(3)])
-            values, Q = symmetric_eigen(S)
-            best = 0
-            for a in ti.static(range(1, 3)):
-                if values[a] > values[best]:
-                    best = a
-            normal = ti.Vector([0.0, 0.0, 0.0])
-            for a in ti.static(range(3)):
-                if best == a:
-                    normal = ti.Vector([Q[0, a], Q[1, a], Q[2, a]])
+        if waiting == 0 and counters[CAPPED] == 0:
+            normal = ti.Vector([normals[t, 0], normals[t, 1], normals[t, 2]])
             # Where cracks end first, the rest at random.
             tried, done = 0, 0
             for _ in range(corners):
@@ -219,10 +216,11 @@ def tear(
                     node = cells[corners * e + a]
                     rank = _hash(ti.cast(seed, ti.u32), ti.cast(step, ti.u32), ti.cast(corners * e + a, ti.u32)) >> 1
                     rank += 0 if tips[node] else 1 << 29
-                    if (tried >> a) & 1 == 0 and (chosen < 0 or rank < least):
+                    wanted = corner[t] < 0 or corner[t] == a
+                    if wanted and (tried >> a) & 1 == 0 and (chosen < 0 or rank < least):
                         chosen, least = a, rank
-                tried |= 1 << chosen
-                if done == 0:
+                if chosen >= 0 and done == 0:
+                    tried |= 1 << chosen
                     vertex = cells[corners * e + chosen]
                     counters[STAMP] = counters[STAMP] + 1
                     count = _walk(corners, cells, beside, mark, around, counters[STAMP], e, vertex, 0)

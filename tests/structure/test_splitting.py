@@ -18,8 +18,8 @@ def tear(split: Splitting, points: np.ndarray, elements, normal, *, seed=0, most
     x = np.zeros((len(split.origin), 3))
     x[:, : points.shape[1]] = points[split.origin]
     normal = np.r_[normal, np.zeros(3 - len(normal))]
-    tensors = np.repeat(np.outer(normal, normal)[None], len(elements), axis=0)
-    return split.tear(x, np.asarray(elements), tensors, seed=(seed, 1), most=most)
+    any_corner = np.full(len(elements), -1)
+    return split.tear(x, elements, any_corner, np.tile(normal, (len(elements), 1)), seed=(seed, 1), most=most)
 
 
 def assert_sound(split: Splitting, cells: np.ndarray) -> None:
