@@ -19,6 +19,10 @@ RECOVERY = 0.2
 STRIDE = 64
 """Tetrahedra that a ray runs through at most: deeper, there is no telling where the node came in."""
 
+MARGIN, DEEPEST = 1e-3, 0.3
+"""Depth, in sizes of the grid, below which a node is not inside yet; and that at the start of the step above which a
+ray must have missed the face through which it came in."""
+
 GRAZING = 0.05
 """Cosine between ray and face below which the face says nothing of where the node came in."""
 
@@ -51,12 +55,12 @@ def _face(w: ti.template(), e: ti.i32, a: ti.i32):
 
 
 @ti.func
-def _inside(w: ti.template(), e: ti.i32, point):
-    """Is the point in the tetrahedron?"""
+def _inside(w: ti.template(), e: ti.i32, point, margin):
+    """Is the point in the tetrahedron, farther from all faces than the margin?"""
     inside = 1
     for a in range(4):
         normal, p = _face(w, e, a)
-        inside &= ti.cast(normal.dot(point - p) <= 0, ti.i32)
+        inside &= ti.cast(normal.dot(point - p) < -margin * normal.norm(), ti.i32)
     return inside
 
 
@@ -68,7 +72,7 @@ def _look(w: ti.template(), n: ti.i32, m: ti.i32, dt: ti.f64, size: ti.f64):
         w.entered[i] = m
     for k in range(w.bucket_start.shape[0]):
         w.bucket_start[k] = 0
-    inverse = ti.cast(1 / size, w.real)
+    inverse, margin = ti.cast(1 / size, w.real), ti.cast(MARGIN * size, w.real)
     for i in range(n):
         normal = ti.Vector.zero(w.real, 3)
         for k in range(w.incident_start[i], w.incident_start[i + 1]):
@@ -100,7 +104,7 @@ def _look(w: ti.template(), n: ti.i32, m: ti.i32, dt: ti.f64, size: ti.f64):
                 k = _bucket(w, c)
                 for q in range(w.bucket_start[k], w.bucket_start[k + 1]):
                     i = w.bucket_node[q]
-                    if w.piece[w.incident[w.incident_start[i]] >> 2] != w.piece[e] and _inside(w, e, w.z[i]):
+                    if w.piece[w.incident[w.incident_start[i]] >> 2] != w.piece[e] and _inside(w, e, w.z[i], margin):
                         ti.atomic_min(w.entered[i], e)
 
 
@@ -133,7 +137,7 @@ def _way_out(w: ti.template(), i: ti.i32, start: ti.i32):
 
 
 @ti.func
-def _note(w: ti.template(), i: ti.i32, e: ti.i32, a: ti.i32, point, dt):
+def _note(w: ti.template(), i: ti.i32, e: ti.i32, a: ti.i32, point, dt, deepest):
     """The spring of node i and the face opposite corner a of element e, at a point of it."""
     found = w.meetings[None]
     normal, _p = _face(w, e, a)
@@ -177,11 +181,12 @@ def _note(w: ti.template(), i: ti.i32, e: ti.i32, a: ti.i32, point, dt):
     held = w.friction[None] * ti.cast(RECOVERY, w.real) * stiff * depth
     side = ti.min(stiff, held / ti.max(slide.norm(), 1e-30))
     w.meeting_stiffness[found] = ti.Vector([stiff, side])
-    w.meetings[None] = found + 1
+    if depth < deepest:
+        w.meetings[None] = found + 1
 
 
 @ti.kernel
-def _gather(w: ti.template(), n: ti.i32, m: ti.i32, dt: ti.f64):
+def _gather(w: ti.template(), n: ti.i32, m: ti.i32, dt: ti.f64, size: ti.f64):
     """List the springs, in the order of the nodes, as far as there is room."""
     ti.loop_config(serialize=True)
     for _ in range(1):
@@ -191,7 +196,7 @@ def _gather(w: ti.template(), n: ti.i32, m: ti.i32, dt: ti.f64):
         if w.entered[i] < m and w.meetings[None] < w.meeting_cell.shape[0]:
             e, a, point = _way_out(w, i, w.entered[i])
             if a >= 0:
-                _note(w, i, e, a, point, ti.cast(dt, w.real))
+                _note(w, i, e, a, point, ti.cast(dt, w.real), ti.cast(DEEPEST * size, w.real))
 
 
 def find(w: World, n: int, m: int, *, dt: float, size: float) -> int:
@@ -200,5 +205,5 @@ def find(w: World, n: int, m: int, *, dt: float, size: float) -> int:
     size: of the cells of the grid [m].
     """
     _look(w, n, m, dt, size)
-    _gather(w, n, m, dt)
+    _gather(w, n, m, dt, size)
     return int(w.meetings[None])
