@@ -9,7 +9,7 @@ import numpy as np
 
 from taichifem import transfer
 from taichifem.breaking import BreakingBodies
-from taichifem.description import Collider, check
+from taichifem.description import Collider, Material, check
 from taichifem.errors import InputError
 from taichifem.hands import Hand, Hands
 
@@ -43,20 +43,39 @@ class InteractiveBodies(BreakingBodies):
         velocities[nodes] += np.asarray(check.vector("impulse", impulse, unit="N s")) / self.masses[nodes].sum()
         self.set_velocities(velocities)
 
-    def set_colliders(self, colliders: Sequence[Collider]) -> None:
-        """Have these colliders from the next step on. Raises InputError for more than the world has room for."""
+    def takes(self, material: Material) -> bool:
+        """Can a body get this material while the simulation runs? Else another law is needed, and a new simulation."""
+        return self._laws.knows(material) and (material.fracture is None or self._may_break)
+
+    def set_colliders(self, colliders: Sequence[Collider], *, kept: bool = False) -> None:
+        """Have these colliders from the next step on. Raises InputError for more than the world has room for.
+
+        kept: they are the same, but for how they move; what touches goes on touching.
+        """
         room, before = self._world.capacity.colliders, self.scene.colliders
         if len(colliders) > room:
             raise InputError(f"there is room for {room} colliders here: make a new simulation for more")
-        with self._kernels():
-            contacts = transfer.read_contacts(self._world, room, self._counts.nodes)
-            kept = [k < min(len(before), len(colliders)) and before[k] == colliders[k] for k in range(room)]
-            for values in contacts.values():
-                values[~np.array(kept)] = 0
-            transfer.write_contacts(self._world, contacts)
+        if not kept:
+            same = [k < min(len(before), len(colliders)) and before[k] == colliders[k] for k in range(room)]
+            with self._kernels():
+                contacts = transfer.read_contacts(self._world, room, self._counts.nodes)
+                for values in contacts.values():
+                    values[~np.array(same)] = 0
+                transfer.write_contacts(self._world, contacts)
         self.scene = replace(self.scene, colliders=tuple(colliders))
         self._counts.colliders = len(colliders)
         self._surroundings.take(self.scene)
+
+    def force_on_ball(self, collider: int, time: float) -> np.ndarray:
+        """Force (3,) [N] with which bodies pressed, in the step that ended at `time` [s], on the sphere `collider`."""
+        ball, rotation, offset = self._poses(time)[collider]
+        with self._kernels():
+            pressed = transfer.read_contacts(self._world, collider + 1, self._counts.nodes)["pressed"][collider]
+            x = transfer.read(self._world, self._world.x, self._counts.nodes)
+        met = np.flatnonzero(pressed > 0)
+        away = x[met] - (rotation @ np.asarray(ball.center) + offset)
+        away /= np.maximum(np.linalg.norm(away, axis=1, keepdims=True), 1e-12)
+        return -(pressed[met, None] * away).sum(axis=0, dtype=float)
 
     def _around(self, node: int, radius: float) -> np.ndarray:
         """Nodes of the body of `node` within `radius` [m] of it at rest, the nearest ones."""

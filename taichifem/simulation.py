@@ -80,6 +80,11 @@ class Simulation(InteractiveBodies):
         return self._clock.frame
 
     @property
+    def substep(self) -> int:
+        """Steps completed of the frame in work."""
+        return self._clock.substep
+
+    @property
     def step_count(self) -> int:
         """Steps completed."""
         return self._clock.steps
@@ -266,7 +271,7 @@ class Simulation(InteractiveBodies):
             except InputError:
                 self.scene, self._clock.substeps = before, before.substeps or self._clock.substeps
                 raise
-        self._stats, self._fresh = None, True
+        self._stats, self._fresh = None, self._fresh or changes.keys() != {"view"}
 
     def _changed(self) -> None:
         self._stats, self._fresh = None, True

@@ -110,6 +110,23 @@ run_options = together(
     quiet_option,
 )
 
+live_options = together(
+    set_option,
+    click.option("--port", type=click.IntRange(0, 65535), metavar="N", help="0 takes any free one.  [default: 8642]"),
+    click.option("--host", default="127.0.0.1", show_default=True, help="Address of this machine to listen on."),
+    click.option("--browser/--no-browser", default=True, help="Open the page, or only say where it is."),
+    click.option("--paused", is_flag=True, help="Wait for the play button."),
+    click.option("--window", is_flag=True, help="In a window of Taichi's, which needs Vulkan and a display."),
+    click.option(
+        "--folder",
+        type=click.Path(file_okay=False, path_type=Path),
+        default="out",
+        show_default=True,
+        help="Where files are saved.",
+    ),
+    machine_options(),
+)
+
 compare_options = together(
     click.option(
         "--vary",
