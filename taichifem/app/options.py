@@ -106,6 +106,7 @@ run_options = together(
     click.option("--checkpoint", type=FILE, metavar="FILE", help="Write the state at the end and on Ctrl-C."),
     click.option("--checkpoint-every", type=click.IntRange(min=1), metavar="N", help="... and every N frames."),
     click.option("--resume", type=FILE, metavar="FILE", help="Go on from a checkpoint of the same scene."),
+    click.option("--replay", type=FILE, metavar="FILE", help="Do again what was done in `taichifem live`."),
     machine_options(),
     quiet_option,
 )

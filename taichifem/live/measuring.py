@@ -18,13 +18,17 @@ class Meter:
 
     def __init__(self) -> None:
         self._steps: deque[tuple[float, float, float, dict[str, float]]] = deque()
+        self._compiled: Simulation | None = None
 
-    def begin(self, simulation: Simulation) -> None:
+    def begin(self) -> None:
         """Forget what was, as after a pause."""
         self._steps.clear()
 
     def note(self, simulation: Simulation, took: float) -> None:
-        """A step is done that took so many seconds."""
+        """A step is done that took so many seconds; the first one of a simulation compiles and does not count."""
+        if self._compiled is not simulation:
+            self._compiled = simulation
+            return
         now = time.perf_counter()
         self._steps.append((now, simulation.dt, took, simulation.phases))
         while self._steps and now - self._steps[0][0] > SPAN:

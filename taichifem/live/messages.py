@@ -29,7 +29,7 @@ class Surface:
         self.nodes, local = np.unique(frame.triangles, return_inverse=True)
         self.triangles = local.reshape(-1, 3)
         self.corners = smoothing(np.asarray(frame.points, float)[self.nodes], self.triangles)
-        self.normals = int(self.corners.max(initial=-1)) + 1
+        self.normals = int(self.corners.max(initial=0)) + 1
 
     def shows(self, frame: Frame) -> bool:
         """Is it the surface of this frame, too?"""

@@ -252,30 +252,35 @@ def check_value(parameter: Parameter, value: object) -> Value:
     return value
 
 
-def differences(before: Scene, after: Scene) -> list[tuple[str, Value]]:
-    """Paths and values of the parameters in which `after` differs from `before`, a scene of the same bodies."""
+def differences(before: Scene, after: Scene, *, all_said: bool = False) -> list[tuple[str, Value]]:
+    """Paths and values of the parameters in which `after` differs from `before`, a scene of the same bodies.
+
+    all_said: also what a choice among them would bring with it.
+    """
     found = []
     for (_, prefix, one), (_, _, two) in zip(materials(before), materials(after), strict=True):
-        found += _different(one, two, prefix, MATERIAL)
+        found += _different(one, two, prefix, MATERIAL, all_said)
     for section, of in (("simulation", lambda s: s), ("view", lambda s: s.view)):
-        found += _different(of(before), of(after), section, _SECTIONS[section])
+        found += _different(of(before), of(after), section, _SECTIONS[section], all_said)
     return found
 
 
-def _different(one: Any, two: Any, prefix: str, parameters: tuple[Parameter, ...]) -> list[tuple[str, Value]]:
+def _different(
+    one: Any, two: Any, prefix: str, parameters: tuple[Parameter, ...], all_said: bool
+) -> list[tuple[str, Value]]:
     found = []
     for p in parameters:
         value = get(two, p.name)
         if value != get(one, p.name):
             found.append((f"{prefix}.{p.name}", value))
-            one = changed(one, p.name, value)  # a choice brings values of its own
+            one = one if all_said else changed(one, p.name, value)  # a choice brings values of its own
     return found
 
 
 def as_overrides(before: Scene, after: Scene) -> list[str]:
     """The same as texts for `--set`. Raises InputError for what no text can say: that something has no value."""
     texts = []
-    for path, value in differences(before, after):
+    for path, value in differences(before, after, all_said=True):
         if path.startswith("simulation.gravity."):
             text = f"simulation.gravity={[float(g) for g in after.gravity]}"
         elif value is None:

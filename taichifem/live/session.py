@@ -80,6 +80,7 @@ class Session:
         """Go on until `stop` is set."""
         try:
             self._show()
+            self.out.notice("the first step compiles, which takes a moment")
             while not stop.is_set():
                 for message in self.inbox.take(self._time_to_wait()):
                     self._obey(message)
@@ -232,7 +233,7 @@ class Session:
         if self.diverged:
             raise InputError("the simulation has diverged: reset it, or go back to the snapshot")
         self.paused, self._due = False, time.perf_counter()
-        self._meter.begin(self.stage.simulation)
+        self._meter.begin()
 
     def _ask_step(self, _: dict) -> None:
         self.paused = True
@@ -257,7 +258,7 @@ class Session:
 
     def _again(self) -> None:
         self.diverged, self._panel, self._due = False, True, time.perf_counter()
-        self._meter.begin(self.stage.simulation)
+        self._meter.begin()
 
     def _ask_camera(self, message: dict) -> None:
         eye, target = (check.vector(name, message.get(name)) for name in ("eye", "target"))
