@@ -7,11 +7,12 @@ export class Camera {
     this.eye = [3, -3, 2];
     this.target = [0, 0, 0];
     this.fov = 35;
-    this.moved = false;
+    this.moved = false; // by hand, which the server does not know yet
+    this.stale = true; // since the last picture
   }
 
   set({ eye, target, fov }) {
-    Object.assign(this, { eye: [...eye], target: [...target], fov });
+    Object.assign(this, { eye: [...eye], target: [...target], fov, stale: true });
   }
 
   get axes() {
@@ -28,7 +29,7 @@ export class Camera {
     const height = Math.min(Math.max(Math.asin(arm[2] / reach) + upwards, -1.55), 1.55);
     const flat = reach * Math.cos(height);
     this.eye = add(this.target, [flat * Math.cos(azimuth), flat * Math.sin(azimuth), reach * Math.sin(height)]);
-    this.moved = true;
+    this.moved = this.stale = true;
   }
 
   // Shift by parts of the height of the picture.
@@ -38,12 +39,12 @@ export class Camera {
     const shift = add(scale(right, -x * size), scale(up, y * size));
     this.eye = add(this.eye, shift);
     this.target = add(this.target, shift);
-    this.moved = true;
+    this.moved = this.stale = true;
   }
 
   zoom(factor) {
     this.eye = add(this.target, scale(sub(this.eye, this.target), factor));
-    this.moved = true;
+    this.moved = this.stale = true;
   }
 
   // What takes world coordinates to those of the screen.

@@ -65,6 +65,7 @@ const told = {
   panel({ groups }) {
     panel.show(groups);
     view.wire = panel.value('view.wire');
+    view.stale = true;
     const down = panel.value('simulation.gravity.z');
     if (down !== 0) state.gravity = down;
     at('weightless').classList.toggle('on', down !== 0);
@@ -122,9 +123,13 @@ function frame() {
     state.updates += 1;
     send({ drawn: news.number });
     news = null;
+    view.stale = true;
   }
-  view.draw();
-  state.drawn += 1;
+  if (view.stale || camera.stale || view.resized) {
+    view.draw();
+    view.stale = camera.stale = false;
+    state.drawn += 1;
+  }
   requestAnimationFrame(frame);
 }
 

@@ -82,12 +82,20 @@ export class View {
     return this.canvas.clientWidth / Math.max(this.canvas.clientHeight, 1);
   }
 
+  // Of the picture, in pixels.
+  get size() {
+    const ratio = Math.min(window.devicePixelRatio || 1, 2);
+    return [Math.round(this.canvas.clientWidth * ratio), Math.round(this.canvas.clientHeight * ratio)];
+  }
+
+  get resized() {
+    return this.canvas.width !== this.size[0] || this.canvas.height !== this.size[1];
+  }
+
   draw() {
     const { gl, canvas, camera } = this;
-    const ratio = Math.min(window.devicePixelRatio || 1, 2);
-    const size = [Math.round(canvas.clientWidth * ratio), Math.round(canvas.clientHeight * ratio)];
-    if (canvas.width !== size[0] || canvas.height !== size[1]) [canvas.width, canvas.height] = size;
-    gl.viewport(0, 0, ...size);
+    if (this.resized) [canvas.width, canvas.height] = this.size;
+    gl.viewport(0, 0, canvas.width, canvas.height);
     gl.clearColor(0.953, 0.961, 0.969, 1);
     gl.clear(gl.COLOR_BUFFER_BIT | gl.DEPTH_BUFFER_BIT | gl.STENCIL_BUFFER_BIT);
     if (!this.update) return;
