@@ -1,6 +1,5 @@
 """The live view in a real browser, headless: what a person would do with the mouse, and what is then to be seen."""
 
-import json
 import time
 
 import numpy as np
@@ -94,10 +93,8 @@ def settle(page):
 
 def on_screen(page, point):
     """Where a point [m] is on the screen."""
-    x, y, _, w = page.value(
-        f"(() => {{ const m = taichifem.camera.matrix(taichifem.view.aspect), p = {json.dumps([*map(float, point), 1])}; "
-        "return [0, 1, 2, 3].map(r => [0, 1, 2, 3].reduce((s, c) => s + m[4 * c + r] * p[c], 0)); })()"
-    )
+    matrix = page.value("Array.from(taichifem.camera.matrix(taichifem.view.aspect))")
+    x, y, _, w = np.array(matrix).reshape(4, 4).T @ [*point, 1]
     return (0.5 + 0.5 * x / w) * SIZE[0], (0.5 - 0.5 * y / w) * SIZE[1]
 
 
@@ -105,7 +102,7 @@ def front_of_tip(page):
     """The node in the middle of the edge at the free end that faces the camera, on the screen."""
     now = points(page)
     tip = now[np.argmax(now @ (1.0, -0.5, 0.0))]
-    return on_screen(page, tip + (-0.03, 0.0, -0.02))
+    return on_screen(page, tip + np.array([-0.03, 0.0, -0.02]))
 
 
 def pull(page, by, seconds=0.5):
