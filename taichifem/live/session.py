@@ -82,16 +82,21 @@ class Session:
             self._show()
             self.out.notice("the first step compiles, which takes a moment")
             while not stop.is_set():
-                for message in self.inbox.take(self._time_to_wait()):
-                    self._obey(message)
-                if not self.paused and time.perf_counter() >= self._due:
-                    self._step()
-                self._keep_informed()
+                self.turn(WAIT if self.paused else min(max(self._due - time.perf_counter(), 0.0), WAIT))
         finally:
-            self._film.end()
+            self.end()
 
-    def _time_to_wait(self) -> float:
-        return WAIT if self.paused else min(max(self._due - time.perf_counter(), 0.0), WAIT)
+    def turn(self, wait: float = 0.0) -> None:
+        """Do what is asked for, waiting at most `wait` seconds for it; a step, if it is time; tell what is new."""
+        for message in self.inbox.take(wait):
+            self._obey(message)
+        if not self.paused and time.perf_counter() >= self._due:
+            self._step()
+        self._keep_informed()
+
+    def end(self) -> None:
+        """Finish what is being written."""
+        self._film.end()
 
     def _step(self) -> None:
         now, stage = time.perf_counter(), self.stage
