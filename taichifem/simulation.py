@@ -306,6 +306,12 @@ class Simulation(InteractiveBodies):
             self._stats = figures(self)
         return self._stats
 
+    def show(self, *, seconds: float | None = None, size: tuple[int, int] = (640, 360)) -> object:
+        """A picture of now, or an animation of the next `seconds`, which Jupyter displays; its `data` is the file."""
+        from taichifem.output.notebook import picture  # a look upstairs, for a short name people can call
+
+        return picture(self, seconds=seconds, size=size)
+
     # Checkpoints
 
     def _fingerprint(self) -> str:

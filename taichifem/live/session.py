@@ -24,8 +24,8 @@ from taichifem.output.colors import VIRIDIS
 from taichifem.output.frame import Frame, build_frame
 from taichifem.output.solids import Solids
 
-UPDATES = 60.0
-"""A second, at most."""
+UPDATES, UPDATES_WHEN_LATE = 60.0, 32.0
+"""A second, at most; and while the simulation is behind real time."""
 
 FIGURES = 0.2
 """Seconds between messages with figures and values."""
@@ -130,7 +130,8 @@ class Session:
 
     def _keep_informed(self) -> None:
         now = time.perf_counter()
-        if self._stale and now - self._shown >= 0.9 / UPDATES:
+        late = not self.paused and now > self._due
+        if self._stale and now - self._shown >= 0.9 / (UPDATES_WHEN_LATE if late else UPDATES):
             self._shown = now
             if self.out.viewers or self.paused:
                 self._show()
