@@ -26,7 +26,7 @@ target = [0.12, 0.0, 0.5]
 fov = 32.0
 [view]
 color = "von-mises"
-range = [0.0, 2.5e4]
+range = [0.0, 1.5e4]
 [[body]]
 name = "bear"
 mesh = { file = "asset:bear" }
@@ -97,13 +97,20 @@ def on_screen(page, point):
     return (0.5 + 0.5 * x / w) * SIZE[0], (0.5 - 0.5 * y / w) * SIZE[1]
 
 
-def act(page, film):
-    points = np.array(page.value("Array.from(taichifem.view.update.points)")).reshape(-1, 3)
-    ear = points[np.argmax(points @ (0.45, -0.1, 1.0))]
-    paw = points[np.argmax(points @ (1.0, -0.1, 0.1))]
-    film.wait(3)
-    film.move(on_screen(page, ear + np.array([-0.03, 0, -0.04])), 5, pressed=False)
+def take(page, film, along):
+    """Take hold of what lies farthest in a direction, an ear or a paw, by its middle: it moves meanwhile."""
+    for count in (5, 1, 1):
+        points = np.array(page.value("Array.from(taichifem.view.update.points)")).reshape(-1, 3)
+        tip = points[np.argmax(points @ np.array(along))]
+        middle = points[np.linalg.norm(points - tip, axis=1) < 0.12].mean(axis=0)
+        film.move(on_screen(page, middle), count, pressed=False)
     film.hold()
+    assert page.value("!!taichifem.hand.held"), "the mouse has missed"
+
+
+def act(page, film):
+    film.wait(3)
+    take(page, film, (0.45, 0.0, 1.0))
     film.move((690, 60), 10)
     film.wait(3)
     film.let()
@@ -118,13 +125,12 @@ def act(page, film):
     film.hold()
     film.move(end, 4)
     film.let()
-    start, end = slider(page, "body.0.material.toughness", 0.35)
+    start, end = slider(page, "body.0.material.toughness", 0.42)
     film.move(start, 3, pressed=False)
     film.hold()
     film.move(end, 5)
     film.let()
-    film.move(on_screen(page, paw + np.array([-0.05, 0, 0])), 5, pressed=False)
-    film.hold()
+    take(page, film, (1.0, 0.0, 0.1))
     film.move((720, 480), 12)
     film.wait(3)
     film.let()
@@ -145,7 +151,7 @@ def main():
             serving.close()
     file = io.BytesIO()
     first, *rest = film.pictures
-    first.save(file, "WEBP", save_all=True, append_images=rest, duration=1000 // FPS, loop=0, quality=55, method=4)
+    first.save(file, "WEBP", save_all=True, append_images=rest, duration=1000 // FPS, loop=0, quality=48, method=4)
     (HERE / "live.webp").write_bytes(file.getvalue())
     print(f"{len(film.pictures)} pictures, {len(file.getvalue()) / 1000:.0f} kB")
     for k in range(0, len(film.pictures), 12):

@@ -48,6 +48,7 @@ def folder(tmp_path_factory):
 def page(folder):
     serving = Serving("bar.toml", folder)
     with Browser(SIZE) as browser:
+        browser.url = serving.url
         browser.open(serving.url)
         browser.wait("taichifem.state.updates > 3 && taichifem.panel.rows.size", 180)
         yield browser
@@ -199,6 +200,15 @@ def test_a_saved_scene_runs_to_the_same_numbers(page, folder):
     np.testing.assert_array_equal(simulation.positions[nodes].astype(np.float32), there)
     simulation.load(saved.with_suffix(".npz"))
     np.testing.assert_array_equal(simulation.positions[nodes].astype(np.float32), there)
+
+
+def test_another_browser_that_is_killed_holds_up_nothing(page):
+    with Browser((400, 300)) as other:
+        other.open(page.url)
+        other.wait("taichifem.state.updates > 3", 60)
+        other.kill()
+    at = clock(page)
+    page.wait(f"taichifem.view.update.time > {at} + 0.2")
 
 
 def test_a_ball_and_a_poke_move_the_body_and_a_pin_holds_it(page, folder):

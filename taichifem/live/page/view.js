@@ -105,7 +105,7 @@ export class View {
     const floor = colliders.filter((c) => c.kind === PLANE_KIND && c.turn[8] > 0.1).sort((a, b) => b.turn[8] - a.turn[8])[0];
     colliders.filter((c) => c.kind === PLANE_KIND).forEach((c) => this.drawPlane(c, c === floor));
     const solids = colliders.filter((c) => c.kind !== PLANE_KIND);
-    if (floor) this.drawShadows(floor, solids);
+    if (floor && isBefore(camera.eye, floor)) this.drawShadows(floor, solids);
     this.drawBodies(null);
     solids.forEach((c) => this.drawSolid(c, GREY, null));
     split(this.update.hands, 8).forEach((hand) => this.drawHand(hand));
@@ -153,7 +153,7 @@ export class View {
   drawPlane({ turn, center }, isFloor) {
     const { gl, plane, camera, extent } = this;
     const normal = turn.slice(6, 9);
-    if (dot(normal, sub(camera.eye, center)) <= 0) return;
+    if (!isBefore(camera.eye, { turn, center })) return;
     const height = dot(normal, sub(camera.target, center));
     const foot = sub(camera.target, scale(normal, height));
     const reach = length(sub(camera.eye, camera.target));
@@ -180,6 +180,9 @@ export class View {
 }
 
 const split = (numbers, size) => Array.from({ length: numbers.length / size }, (_, k) => numbers.subarray(size * k, size * (k + 1)));
+
+// Is a point on the free side of a plane?
+const isBefore = (point, { turn, center }) => dot(turn.slice(6, 9), sub(point, center)) > 0;
 
 // Rows of R and c, kind and size; matrices of shaders go by columns.
 function asCollider(row) {
