@@ -59,7 +59,10 @@ const told = {
     view.extent = message.extent;
     view.setMap(message.map);
     at('bar-colors').style.background = `linear-gradient(to top, ${message.map.join(', ')})`;
-    if (!state.hello) camera.set(message.camera);
+    if (!state.hello) {
+      camera.set(message.camera);
+      camera.zoom(1.2); // the panels take some of the room
+    }
     state.hello = message;
   },
   panel({ groups }) {
