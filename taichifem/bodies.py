@@ -12,6 +12,7 @@ from taichifem.description import Collider, Material, Scene
 from taichifem.description.check import whole
 from taichifem.description.material import ELASTIC
 from taichifem.errors import InputError
+from taichifem.hands import Hands
 from taichifem.integrators import EXACT, symplectic_euler
 from taichifem.laws import Laws
 from taichifem.layout import AXES, Layout, lay_out
@@ -51,6 +52,7 @@ class Bodies:
         room = room_for(scene, layout, self._laws, pattern=self._pattern, levels=self._levels, program=self._program)
         self._world: World = acquire(room, precision, self)
         self._counts = Counts(bodies=len(scene.bodies), colliders=len(scene.colliders))
+        self._hands = Hands()
         self._fill()
         self._gravity = np.asarray(scene.gravity, dtype=float)
         self._due = 0.0  # time over which plastic flow is due: it is made up for when the next step begins [s]
@@ -87,7 +89,7 @@ class Bodies:
         with self._kernels():
             transfer.fill_mesh(self._world, layout, pattern)
         self._fill_matrix()
-        self._surroundings = Surroundings(self.scene, layout, self._world, self._counts)
+        self._surroundings = Surroundings(self.scene, layout, self._world, self._counts, self._hands)
 
     def _fill_matrix(self) -> None:
         """Give the world what the solver has to know of the matrix."""

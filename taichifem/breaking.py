@@ -7,6 +7,7 @@ import numpy as np
 from taichifem import transfer
 from taichifem.bodies import Bodies
 from taichifem.description import Scene
+from taichifem.errors import InputError
 from taichifem.processes import fracture
 from taichifem.skin import Skin, split_skin
 from taichifem.structure.pieces import label_pieces
@@ -114,6 +115,8 @@ class BreakingBodies(Bodies):
 
     def _become(self, cells: np.ndarray, origin: np.ndarray, tips: np.ndarray) -> None:
         """Have the elements `cells`, of nodes and copies of the scene's nodes `origin`, everything at rest."""
+        if not self._may_break:
+            raise InputError("the state is of a body that broke, and nothing of this scene breaks: give it a toughness")
         self._splitting = Splitting(cells, origin, tips)
         self._take(self._split_layout())
         self._fill()

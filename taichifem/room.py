@@ -7,6 +7,7 @@ from dataclasses import replace
 import numpy as np
 
 from taichifem.description import Scene
+from taichifem.hands import ROOM
 from taichifem.laws import Laws
 from taichifem.layout import Layout
 from taichifem.linear_algebra.program import most_operations
@@ -26,10 +27,10 @@ def room_for(
         blocks=pattern.n_blocks,
         pairs=pattern.n_pairs,
         materials=len(layout.materials),
-        colliders=len(scene.colliders),
-        held=1 + sum(len(g.nodes) for g in layout.pins),
-        pulled=1 + sum(len(g.nodes) for g in layout.handles),
-        poses=len(layout.pins) + len(layout.handles),
+        colliders=1 + len(scene.colliders),
+        held=1 + ROOM + sum(len(g.nodes) for g in layout.pins),
+        pulled=1 + ROOM + sum(len(g.nodes) for g in layout.handles),
+        poses=1 + ROOM + len(layout.pins) + len(layout.handles),
         bodies=len(scene.bodies),
         aggregates=layout.aggregates.count,
         coarse_blocks=len(levels.column) - pattern.n_blocks,
@@ -78,8 +79,8 @@ def _broken(whole: Capacity, layout: Layout) -> Capacity:
         nodes=nodes,
         blocks=nodes * corners,
         pairs=pairs,
-        held=1 + sum(int(around[g.nodes].sum()) for g in layout.pins),
-        pulled=1 + sum(int(around[g.nodes].sum()) for g in layout.handles),
+        held=1 + ROOM + sum(int(around[g.nodes].sum()) for g in layout.pins),
+        pulled=1 + ROOM + sum(int(around[g.nodes].sum()) for g in layout.handles),
         aggregates=aggregates,
         coarse_blocks=8 * coarse_pairs,
         coarse_pairs=coarse_pairs,

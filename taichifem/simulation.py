@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 import os
 from collections.abc import Callable
-from dataclasses import asdict
+from dataclasses import asdict, replace
 
 import numpy as np
 
@@ -15,7 +15,7 @@ from taichifem.description import Collider, Load, Material, Scene
 from taichifem.errors import Diverged, InputError
 from taichifem.integrators import ADVANCE, implicit, symplectic_euler
 from taichifem.integrators.step import Options, Step, StepReport
-from taichifem.meeting_bodies import MeetingBodies
+from taichifem.interactive import InteractiveBodies
 from taichifem.state import element_fields, node_fields
 from taichifem.stats import Stats, figures
 from taichifem.supports import check_supports
@@ -25,7 +25,7 @@ STATIC_TOLERANCE, STATIC_ITERATIONS = 1e-6, 50_000
 """Of the linear solver in a static solve: the stiffness matrix alone is far worse conditioned than a step's."""
 
 
-class Simulation(MeetingBodies):
+class Simulation(InteractiveBodies):
     """The state of a scene over time. Arrays in and out are NumPy, float64, SI units; z points up.
 
     precision: "f32" (real time) or "f64".  arch, threads: as `taichifem.runtime.start`; None keeps what runs.
@@ -78,6 +78,11 @@ class Simulation(MeetingBodies):
     def frame(self) -> int:
         """Frames completed."""
         return self._clock.frame
+
+    @property
+    def substep(self) -> int:
+        """Steps completed of the frame in work."""
+        return self._clock.substep
 
     @property
     def step_count(self) -> int:
@@ -253,6 +258,23 @@ class Simulation(MeetingBodies):
                 self._change_material(row, before)
                 raise
 
+    def adjust(self, **changes: object) -> None:
+        """Change gravity, tolerances, view and other plain fields of the scene from the next step on.
+
+        `substeps` too, between frames.  Raises InputError for values out of bounds, and for a time step so long that
+        symplectic Euler is unstable.
+        """
+        before, self.scene = self.scene, replace(self.scene, **changes)
+        if "substeps" in changes:
+            try:
+                self._clock.substeps = self.scene.substeps or 1
+                if self._explicit:
+                    self._keep_stable()
+            except InputError:
+                self.scene, self._clock.substeps = before, before.substeps or self._clock.substeps
+                raise
+        self._stats, self._fresh = None, self._fresh or changes.keys() != {"view"}
+
     def _changed(self) -> None:
         self._stats, self._fresh = None, True
 
@@ -286,6 +308,12 @@ class Simulation(MeetingBodies):
             self._stats = figures(self)
         return self._stats
 
+    def show(self, *, seconds: float | None = None, size: tuple[int, int] = (640, 360)) -> object:
+        """A picture of now, or an animation of the next `seconds`, which Jupyter displays; its `data` is the file."""
+        from taichifem.output.notebook import picture  # a look upstairs, for a short name people can call
+
+        return picture(self, seconds=seconds, size=size)
+
     # Checkpoints
 
     def _fingerprint(self) -> str:
@@ -299,13 +327,17 @@ class Simulation(MeetingBodies):
 
     def save(self, path: str | os.PathLike) -> None:
         """Write everything the next steps depend on; see `load`. Raises InputError if it cannot be written."""
+        checkpoint.write(path, *self.snapshot())
+
+    def snapshot(self) -> tuple[dict[str, np.ndarray], dict]:
+        """What `save` writes: arrays and a header, for `restore`."""
         w = self._world
         with self._kernels():
             arrays = {name: transfer.read(w, getattr(w, name), count) for name, count in self._state().items()}
             arrays |= transfer.read_contacts(w, self._counts.colliders, self._counts.nodes)
         arrays |= {"cells": self.cells, "origins": self.origins, "tips": self.crack_tips}
         header = {"scene": self._fingerprint(), "clock": asdict(self._clock), "fresh": self._fresh, "due": self._due}
-        checkpoint.write(path, arrays, header)
+        return arrays, header
 
     def load(self, path: str | os.PathLike) -> None:
         """Continue from a checkpoint of the same scene, integrator and precision, bit for bit as if never interrupted.
@@ -317,19 +349,32 @@ class Simulation(MeetingBodies):
         same_steps = self.scene.substeps is None or clock.substeps == self.scene.substeps
         if header.get("scene") != self._fingerprint() or clock.fps != self.scene.fps or not same_steps:
             raise InputError(f"{path}: the checkpoint belongs to another scene, time step or precision")
-        w = self._world
-        same = all(np.array_equal(arrays[k], v) for k, v in (("cells", self.cells), ("tips", self.crack_tips)))
-        if same:
+        self.restore(arrays, header)
+
+    def restore(self, arrays: dict[str, np.ndarray], header: dict) -> None:
+        """Go on from a `snapshot` of the same meshes and time step; hands let go.
+
+        One of other laws or another integrator will do too: what only one of the two knows of begins at rest.
+        """
+        w, same = self._world, header["scene"] == self._fingerprint()
+        self._hands.clear()
+        topology = ("cells", self.cells), ("tips", self.crack_tips)
+        if all(np.array_equal(arrays[name], now) for name, now in topology):
             self._surroundings.forget()
         else:
             self._become(arrays["cells"], arrays["origins"], arrays["tips"])
         with self._kernels():
             for name in self._state():
-                transfer.write(w, getattr(w, name), arrays[name])
+                if name in arrays:
+                    transfer.write(w, getattr(w, name), arrays[name])
             transfer.write_contacts(w, arrays)
-        self._clock, self._fresh, self._due = clock, bool(header["fresh"]), float(header["due"])
+        self._clock, self._fresh, self._due = Clock(**header["clock"]), not same or bool(header["fresh"]), header["due"]
+        if not same and self._clock.substep == 0:
+            self._clock.substeps = self.scene.substeps or 1
         self._surround(self.time, self.dt)
         self._stats = self._loaded = None
+        if self._explicit and not same:
+            self._keep_stable()
 
     def _state(self) -> dict[str, int]:
         """Fields that go into a checkpoint, and how many entries of each."""

@@ -10,6 +10,7 @@ from taichifem import transfer
 from taichifem.description import BoxCollider, Collider, Motion, PlaneCollider, Scene, SphereCollider
 from taichifem.description.motion import rotation_matrix
 from taichifem.formulas.collision import BOX, PLANE, SPHERE
+from taichifem.hands import ROOM, Hands
 from taichifem.layout import Group, Layout
 from taichifem.world import Counts, World
 
@@ -22,16 +23,23 @@ class Surroundings:
     held_bodies (bodies,): what some pin holds now.  held (k,5): node, group and axes (1 or 0) of every pinned node.
     """
 
-    def __init__(self, scene: Scene, layout: Layout, world: World, counts: Counts) -> None:
+    def __init__(self, scene: Scene, layout: Layout, world: World, counts: Counts, hands: Hands) -> None:
         self.held_bodies = np.zeros(len(scene.bodies), dtype=bool)
         self.held = np.zeros((0, 5))
         self._scene, self._layout, self._world, self._counts = scene, layout, world, counts
         self._groups: list[Group] = [*layout.pins, *layout.handles]
+        self._hands = hands
+        self._number = np.argsort(layout.node_order)  # of each node of the scene in the world
         self.forget()
 
     def forget(self) -> None:
         """Send everything again at the next update, as after loading a state."""
         self._active: list[bool] | None = None
+
+    def take(self, scene: Scene) -> None:
+        """Go on with the colliders of `scene`."""
+        self._scene = scene
+        self.forget()
 
     @property
     def last_key(self) -> float:
@@ -52,7 +60,7 @@ class Surroundings:
     @property
     def held_for_ever(self) -> np.ndarray:
         """The rows of `held` that no time lets go."""
-        lasting = np.array([group.until is None for group in self._groups], dtype=bool)
+        lasting = np.array([group.until is None for group in self._groups] + [False] * (1 + ROOM), dtype=bool)
         return self.held[lasting[self.held[:, 1].astype(int)]]
 
     def update(self, time: float, dt: float, *, all_act: bool = False) -> bool:
@@ -63,15 +71,16 @@ class Surroundings:
         """
         everything = self._active is None
         motions = [group.motion for group in self._groups]
-        if everything or any(m is not None for m in motions):
-            transfer.fill_poses(self._world, pose_table(motions, time))
+        if everything or len(self._hands) or any(m is not None for m in motions):
+            poses = pose_table(motions, time), self._hands.poses(self._layout.rest[self._number])
+            transfer.fill_poses(self._world, np.concatenate(poses))
         if everything or any(c.motion is not None for c in self._scene.colliders):
             table = collider_table(self._scene.colliders, time, dt)
             transfer.fill_colliders(self._world, table)
         active = [all_act or group.acts_at(time) for group in self._groups]
-        if active == self._active:
+        if active == self._active and not self._hands.changed:
             return False
-        self._active = active
+        self._active, self._hands.changed = active, False
         self._choose(active)
         return True
 
@@ -91,6 +100,10 @@ class Surroundings:
             else:
                 pulled.append(np.column_stack([group.nodes, which]))
                 stiffness.append(np.full(len(group.nodes), group.stiffness))
+        by_hand = self._hands.rows(self._number, max(len(self._groups), 1))
+        for rows, more in zip((held, pulled, stiffness), by_hand, strict=True):
+            rows.append(more)
+        self.held_bodies[self._layout.node_bodies[by_hand[0][:, 0].astype(int)]] = True
         nodes, springs = self.held, _ = np.concatenate(held), np.concatenate(pulled)
         self._counts.held, self._counts.pulled = len(nodes), len(springs)
         transfer.fill_groups(self._world, nodes, springs, np.concatenate(stiffness))

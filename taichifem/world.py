@@ -61,7 +61,7 @@ class Capacity:
     springs: bool = False  # are there elements made of springs?
     plastic: bool = False  # are there plastic materials?
 
-    LEAST = (256, 1024, 4096, 2048, 8, 4, 256, 256, 8, 8, 32, 1024, 256, 1024, 64, 1)
+    LEAST = (256, 1024, 4096, 2048, 8, 4, 512, 512, 256, 8, 32, 1024, 256, 1024, 64, 1)
 
     def rounded(self) -> Capacity:
         """The capacity class: every count rounded up to a power of two."""

@@ -13,6 +13,7 @@ from taichifem.app.options import (
     MODELS,
     PLASTICITIES,
     compare_options,
+    live_options,
     machine_options,
     run_options,
     static_options,
@@ -26,6 +27,7 @@ Examples:
   taichifem demo hello                            writes out/hello.mp4
   taichifem run scene.toml -o fall.mp4 --seconds 3
   taichifem run scene.toml --set body.0.material.youngs=2e5 --color von-mises
+  taichifem live hello                            take hold of it in the browser
   taichifem compare twist --vary model=corotational,stvk --video laws.mp4
   taichifem mesh surface.obj -o solid.vtu --tets 5000
 """
@@ -93,6 +95,24 @@ def demo(ctx: click.Context, name: str | None, **options: Any) -> None:
     for entry in demos().values():
         listing.add_row(entry.name, entry.description or entry.title)
     console().print(listing if listing.rows else "no demos are installed")
+
+
+@cli.command()
+@click.argument("scene")
+@live_options
+def live(scene: str, **options: Any) -> None:
+    """Take hold of a scene while it runs: pull it, turn its parameters, watch it yield and break.
+
+    SCENE is a scene file or the name of a demo. Serves a page on this machine and opens it in the browser.
+
+    \b
+    Examples:
+      taichifem live hello
+      taichifem live scene.toml --no-browser --port 9000
+    """
+    from taichifem.app.live import LiveOptions, run_live
+
+    run_live(scene, LiveOptions(**options))
 
 
 def _run(ctx: click.Context, scene: Path, options: dict[str, Any]) -> None:

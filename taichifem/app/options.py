@@ -106,8 +106,26 @@ run_options = together(
     click.option("--checkpoint", type=FILE, metavar="FILE", help="Write the state at the end and on Ctrl-C."),
     click.option("--checkpoint-every", type=click.IntRange(min=1), metavar="N", help="... and every N frames."),
     click.option("--resume", type=FILE, metavar="FILE", help="Go on from a checkpoint of the same scene."),
+    click.option("--replay", type=FILE, metavar="FILE", help="Do again what was done in `taichifem live`."),
     machine_options(),
     quiet_option,
+)
+
+live_options = together(
+    set_option,
+    click.option("--port", type=click.IntRange(0, 65535), metavar="N", help="0 takes any free one.  [default: 8642]"),
+    click.option("--host", default="127.0.0.1", show_default=True, help="Address of this machine to listen on."),
+    click.option("--browser/--no-browser", default=True, help="Open the page, or only say where it is."),
+    click.option("--paused", is_flag=True, help="Wait for the play button."),
+    click.option("--window", is_flag=True, help="In a window of Taichi's, which needs Vulkan and a display."),
+    click.option(
+        "--folder",
+        type=click.Path(file_okay=False, path_type=Path),
+        default="out",
+        show_default=True,
+        help="Where files are saved.",
+    ),
+    machine_options(),
 )
 
 compare_options = together(

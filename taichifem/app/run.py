@@ -19,6 +19,7 @@ from taichifem.output.video import open_video
 from taichifem.scene import read_scene
 
 if TYPE_CHECKING:
+    from taichifem.description import Scene
     from taichifem.simulation import Simulation
 
 OUT = Path("out")
@@ -48,13 +49,14 @@ class RunOptions:
     checkpoint: Path | None = None
     checkpoint_every: int | None = None
     resume: Path | None = None
+    replay: Path | None = None
     arch: str | None = None
     threads: int | None = None
     precision: str = "f32"
     quiet: bool = False
 
     def __post_init__(self) -> None:
-        for one, other in (("frames", "seconds"), ("output", "no_video")):
+        for one, other in (("frames", "seconds"), ("output", "no_video"), ("resume", "replay")):
             if getattr(self, one) and getattr(self, other):
                 raise InputError(f"--{one} and --{_dashed(other)} exclude each other: give one")
         for one, other in (("export_format", "export"), ("checkpoint_every", "checkpoint")):
@@ -80,12 +82,7 @@ def run_scene(path: Path, options: RunOptions) -> Summary:
     scene = read_scene(path, overrides=options.scene_overrides())
     if options.checkpoint is not None:
         need_place(options.checkpoint)
-    start_taichi(options.arch, options.threads)
-    from taichifem.simulation import Simulation
-
-    simulation = Simulation(scene, precision=options.precision)
-    if options.resume is not None:
-        simulation.load(options.resume)
+    simulation = _begin(scene, options)
     if scene.integrator == "symplectic-euler" and not options.quiet:
         click.echo(explicit_steps(simulation))
     summary = _record(simulation, _frames_left(simulation, options), path.stem, options)
@@ -94,6 +91,27 @@ def run_scene(path: Path, options: RunOptions) -> Summary:
         for file in summary.files:
             click.echo(f"wrote {file}")
     return summary
+
+
+def _begin(scene: Scene, options: RunOptions) -> Simulation:
+    """The simulation at its start: that of a checkpoint, or one on which interactions are done again."""
+    interactions = None
+    if options.replay is not None:
+        from taichifem.live.interactions import Interactions
+
+        interactions = Interactions.read(options.replay)
+    start_taichi(options.arch, options.threads)
+    if interactions is not None:
+        from taichifem.live.replay import Replay
+        from taichifem.live.stage import Stage
+
+        return Replay(Stage(scene, precision=options.precision), interactions)
+    from taichifem.simulation import Simulation
+
+    simulation = Simulation(scene, precision=options.precision)
+    if options.resume is not None:
+        simulation.load(options.resume)
+    return simulation
 
 
 def explicit_steps(simulation: Simulation) -> str:

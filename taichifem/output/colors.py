@@ -24,7 +24,7 @@ CRACK = np.array([0.95, 0.93, 0.88], np.float32)
 """What the colour of a body goes towards on faces that fracture has opened."""
 
 # The published anchors of viridis at nine equal steps.
-_VIRIDIS = (
+VIRIDIS = (
     "#440154",
     "#472d7b",
     "#3b528b",
@@ -54,7 +54,7 @@ def body_colors(count: int, chosen: tuple[str, ...] = ()) -> np.ndarray:
     return np.array([parse_hex(name) for name in names], np.float32).reshape(count, 3)
 
 
-_ANCHORS = np.array([parse_hex(c) for c in _VIRIDIS])
+_ANCHORS = np.array([parse_hex(c) for c in VIRIDIS])
 _TABLE = np.stack(
     [np.interp(np.linspace(0, 1, 256), np.linspace(0, 1, len(_ANCHORS)), _ANCHORS[:, k]) for k in range(3)],
     axis=1,

@@ -39,6 +39,7 @@ os._exit(0 if color[0] > 0.9 and color[1] < 0.1 else 3)
 _TIMEOUT = 30
 _REMEDY = "install a Vulkan driver (Debian, Ubuntu: apt-get install libvulkan1 mesa-vulkan-drivers)"
 _WINDOW_LIFE = 600
+_VISIBLE_LIFE = 6000
 """Frames after which the window is made anew: GGUI keeps some memory of every mesh drawn."""
 
 _HORIZON = colors.parse_hex("#f3f5f7")
@@ -99,18 +100,26 @@ def _close_window() -> None:
 
 
 class GguiRenderer:
-    """Draws frames in a hidden GGUI window. One at a time in a process: the last one made draws."""
+    """Draws frames in a hidden GGUI window. One at a time in a process: the last one made draws.
+
+    visible: the window is shown; who uses `place` and `window` then draws its widgets and shows it.
+    """
 
     _drawing: GguiRenderer | None = None
 
     def __init__(
-        self, size: tuple[int, int] = (1280, 720), camera: Camera | None = None, *, arch: str | None = None
+        self,
+        size: tuple[int, int] = (1280, 720),
+        camera: Camera | None = None,
+        *,
+        arch: str | None = None,
+        visible: bool = False,
     ) -> None:
         ok, why = probe()
         if not ok:
             raise InputError(f"renderer ggui is not available: {why}, or use the renderer taichi")
         self.size = size
-        self._arch = arch
+        self._arch, self._visible = arch, visible
         self._framing = Framing(camera, size)
         self._normals = CornerNormals()
         self._window = self._scene = None
@@ -138,6 +147,18 @@ class GguiRenderer:
             settings_file.unlink(missing_ok=True)
         return annotate(picture, frame)
 
+    @property
+    def window(self) -> ti.ui.Window:
+        """The window that `place` has drawn into."""
+        return self._window
+
+    def place(self, frame: Frame) -> Viewpoint:
+        """Draw a frame into the window; where it is seen from."""
+        viewpoint = self._framing.of(lambda: Solids(frame).subject())
+        self._open()
+        self._draw(Solids(frame, viewpoint.eye), viewpoint)
+        return viewpoint
+
     def move(self, camera: Camera) -> None:
         """Look from `camera` from the next frame on."""
         self._framing.move(camera)
@@ -156,17 +177,23 @@ class GguiRenderer:
     def _open(self) -> None:
         if self._generation != runtime.generation:
             self._window, self._capacity = None, 0  # went with the Taichi they were made in
-        if self._window is not None and self._drawn < _WINDOW_LIFE:
+        if self._window is not None and self._drawn < (_VISIBLE_LIFE if self._visible else _WINDOW_LIFE):
             return
         if GguiRenderer._drawing is not None:
             GguiRenderer._drawing.close()
-        self._window = ti.ui.Window("taichifem", self.size, show_window=False, vsync=False)
+        self._window = ti.ui.Window("taichifem", self.size, show_window=self._visible, vsync=False)
         self._scene = self._window.get_scene()
         self._camera = ti.ui.Camera()
         self._drawn, self._generation = 0, runtime.generation
         GguiRenderer._drawing = self
 
     def _render(self, solids: Solids, viewpoint: Viewpoint) -> np.ndarray:
+        self._draw(solids, viewpoint)
+        image = self._window.get_image_buffer_as_numpy()
+        picture = image.transpose(1, 0, 2)[::-1, :, :3]
+        return np.ascontiguousarray((np.clip(picture, 0, 1) * 255 + 0.5).astype(np.uint8))
+
+    def _draw(self, solids: Solids, viewpoint: Viewpoint) -> None:
         points, normals, shades = _triangle_soup(solids, self._normals.of(solids), viewpoint)
         if solids.floor is not None and solids.floor.normal @ (viewpoint.eye - solids.floor.center) > 0:
             disc = _floor_disc(solids, viewpoint)
@@ -197,9 +224,6 @@ class GguiRenderer:
         canvas = self._window.get_canvas()
         canvas.set_background_color(tuple(float(c) for c in _HORIZON))
         canvas.scene(scene)
-        image = self._window.get_image_buffer_as_numpy()
-        picture = image.transpose(1, 0, 2)[::-1, :, :3]
-        return np.ascontiguousarray((np.clip(picture, 0, 1) * 255 + 0.5).astype(np.uint8))
 
 
 def _triangle_soup(
