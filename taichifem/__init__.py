@@ -17,6 +17,7 @@ _HOME = {
     "taichifem.errors": "Diverged InputError",
     "taichifem.mesh": "TetMesh TriMesh",
     "taichifem.scene": "preset",
+    "taichifem.factory": "simulate",
     "taichifem.simulation": "Simulation",
 }
 _MODULE = {name: module for module, names in _HOME.items() for name in names.split()}

@@ -12,7 +12,7 @@ import click
 # The packages that own these lists take a second to import; a test compares.
 ARCHES = ("cpu", "cuda", "vulkan", "metal")
 PRECISIONS = ("f32", "f64")
-MODELS = ("mass-spring", "linear", "corotational", "stvk", "neo-hookean", "invertible")
+MODELS = ("mass-spring", "linear", "corotational", "stvk", "neo-hookean", "invertible", "modal", "condensed", "bem")
 PLASTICITIES = ("none", "creep", "von-mises", "tresca")
 RENDERERS = ("auto", "taichi", "ggui", "pyvista")
 COLORS = ("material", "piece", "von-mises", "plastic-strain", "displacement", "speed")

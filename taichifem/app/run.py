@@ -81,9 +81,9 @@ def run_scene(path: Path, options: RunOptions) -> Summary:
     if options.checkpoint is not None:
         need_place(options.checkpoint)
     start_taichi(options.arch, options.threads)
-    from taichifem.simulation import Simulation
+    from taichifem.factory import simulate
 
-    simulation = Simulation(scene, precision=options.precision)
+    simulation = simulate(scene, precision=options.precision)
     if options.resume is not None:
         simulation.load(options.resume)
     if scene.integrator == "symplectic-euler" and not options.quiet:

@@ -3,8 +3,8 @@
 With forces f (m,3) constant over a step, the gaps and slips at its end are D f + d. Normal forces only push, friction
 is at most mu times the normal force, and both do what they can: min 1/2 f D f + f d within these bounds. Normal and
 tangential bounds are renewed in turns (staggered projections: Kaufman et al. 2008), each problem being solved by
-accelerated projected gradients (Nesterov's method with restarts; Mazhar et al. 2015). In the end the forces are scaled
-to the best length: then f (D f + d) = 0, so that contact does no work but that of closing gaps, which takes energy.
+accelerated projected gradients (Nesterov's method with restarts; Mazhar et al. 2015). What is left of an iteration's
+error may do no work: forces with f (D f + d) > 0 are made shorter until that is 0. So contact takes energy only.
 """
 
 from __future__ import annotations
@@ -32,7 +32,7 @@ def contact_forces(answer: np.ndarray, end: np.ndarray, friction: np.ndarray) ->
     forces = np.zeros_like(end)
     for _ in range(PASSES if (friction > 0).any() else 1):
         forces = _descend(answer, end, friction * forces[:, 0], forces)
-    return _best_length(answer, end, forces)
+    return _without_work(answer, end, forces)
 
 
 def stopping_impulses(answer: np.ndarray, velocity: np.ndarray, most: np.ndarray) -> np.ndarray:
@@ -40,7 +40,7 @@ def stopping_impulses(answer: np.ndarray, velocity: np.ndarray, most: np.ndarray
 
     answer D (3m,3m): velocity by impulses.  velocity (m,3): relative, normal first. They never add kinetic energy.
     """
-    return _best_length(answer, velocity, _descend(answer, velocity, most, np.zeros_like(velocity), pulls=True))
+    return _without_work(answer, velocity, _descend(answer, velocity, most, np.zeros_like(velocity), pulls=True))
 
 
 def _descend(
@@ -82,8 +82,8 @@ def _largest(matrix: np.ndarray) -> float:
     return max(min(float(np.abs(matrix).sum(axis=0).max()), float(np.trace(matrix))), 1e-300)
 
 
-def _best_length(answer: np.ndarray, end: np.ndarray, forces: np.ndarray) -> np.ndarray:
-    """The forces scaled to the minimum of 1/2 f D f + f d along them, at most doubled: then they do no work f (D f + d)."""
+def _without_work(answer: np.ndarray, end: np.ndarray, forces: np.ndarray) -> np.ndarray:
+    """The forces, or if f (D f + d) > 0 as much shorter as makes that 0."""
     flat = forces.ravel()
     work, against = flat @ (answer @ flat), -flat @ end.ravel()
-    return forces * max(0.0, against / work) if work > 0 else np.zeros_like(forces)
+    return forces * max(0.0, against / work) if work > against else forces
