@@ -14,6 +14,7 @@ from taichifem.app.options import (
     PLASTICITIES,
     compare_options,
     machine_options,
+    modes_options,
     run_options,
     static_options,
 )
@@ -123,6 +124,25 @@ def static(ctx: click.Context, scene: str, **options: Any) -> None:
 
     if not run_static(scene, StaticOptions(**options)).converged:
         ctx.exit(UNSOLVED)
+
+
+@cli.command()
+@click.argument("scene")
+@modes_options
+def modes(scene: str, **options: Any) -> None:
+    """Show how the bodies of a scene vibrate.
+
+    SCENE is a scene file or the name of a demo. Prints the lowest frequencies of each body as its pins hold it, without
+    the rigid motions of a free one, for small displacements; writes a picture and a looping video of each mode.
+
+    \b
+    Examples:
+      taichifem modes scene.toml --modes 6
+      taichifem modes twist --modes 10 --no-video --no-picture --json modes.json
+    """
+    from taichifem.app.modes import ModesOptions, show_modes
+
+    show_modes(scene, ModesOptions(**options))
 
 
 @cli.command()

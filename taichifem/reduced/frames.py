@@ -6,30 +6,32 @@ only: what their inertia would do to it is of second order in the displacement (
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass, replace
+from functools import cached_property
 
 import numpy as np
 
 from taichifem.description import Motion
 from taichifem.surroundings import pose
 
-MIDPOINT_TURNS = 4
+MIDPOINT_TURNS = 3
 
 
 def turned(rotation: np.ndarray, angle: np.ndarray) -> np.ndarray:
     """`rotation` (3,3) followed by a turn by the vector `angle` (3,) [rad] (Rodrigues)."""
-    size = np.linalg.norm(angle)
-    cross = np.cross(np.eye(3), angle)
-    sine = np.sinc(size / np.pi)
-    half = 0.5 * np.sinc(0.5 * size / np.pi) ** 2
-    exact = (np.eye(3) + sine * cross + half * cross @ cross) @ rotation
-    u, _, v = np.linalg.svd(exact)  # round-off must not add up over a long run
-    return u @ v
+    x, y, z = angle
+    size = math.sqrt(x * x + y * y + z * z)
+    cross = np.array([[0.0, -z, y], [z, 0.0, -x], [-y, x, 0.0]])
+    sine = math.sin(size) / size if size > 0 else 1.0
+    half = math.sin(0.5 * size) / size if size > 0 else 0.5
+    new = rotation + (sine * cross + 2 * half * half * cross @ cross) @ rotation
+    return 1.5 * new - 0.5 * new @ new.T @ new  # back to a rotation: round-off must not add up over a long run
 
 
 @dataclass(frozen=True)
 class FreeFrame:
-    """A rigid body: mass [kg], inertia (3,3) in the frame [kg m^2], velocity (3,) [m/s] of its centre of mass, which
+    """A rigid body: mass [kg], turns: inverse (3,3) of its inertia in the frame [kg m^2], velocity (3,) [m/s] of its centre of mass, which
     is the origin, and angular momentum (3,) about it [kg m^2/s]."""
 
     rotation: np.ndarray
@@ -37,7 +39,7 @@ class FreeFrame:
     velocity: np.ndarray
     momentum: np.ndarray
     mass: float
-    inertia: np.ndarray
+    turns: np.ndarray
 
     coordinates = 6
 
@@ -49,15 +51,15 @@ class FreeFrame:
         local = rest - origin
         inertia = (masses * (local**2).sum(axis=1)).sum() * np.eye(3) - (masses[:, None] * local).T @ local
         momentum = (masses[:, None] * np.cross(local, velocities - velocity)).sum(axis=0)
-        return cls(np.eye(3), origin, velocity, momentum, mass, inertia), local
+        return cls(np.eye(3), origin, velocity, momentum, mass, np.linalg.inv(inertia)), local
 
-    @property
+    @cached_property
     def spin(self) -> np.ndarray:
         """Angular velocity (3,) [rad/s]."""
         return self._spin(self.rotation, self.momentum)
 
     def _spin(self, rotation: np.ndarray, momentum: np.ndarray) -> np.ndarray:
-        return rotation @ np.linalg.solve(self.inertia, rotation.T @ momentum)
+        return rotation @ (self.turns @ (rotation.T @ momentum))
 
     @property
     def kinetic_energy(self) -> float:
@@ -106,7 +108,7 @@ class FreeFrame:
         """Velocity and angular velocity by impulse and angular impulse (6,6)."""
         found = np.zeros((6, 6))
         found[:3, :3] = np.eye(3) / self.mass
-        found[3:, 3:] = self.rotation @ np.linalg.solve(self.inertia, self.rotation.T)
+        found[3:, 3:] = self.rotation @ self.turns @ self.rotation.T
         return found
 
 

@@ -116,6 +116,9 @@ class ModalBody:
         """[J]"""
         return self.frame.kinetic_energy + self.modes.kinetic_energy
 
+    def surface_stress(self) -> None:
+        """The elements know it as well."""
+
     def state(self) -> dict[str, np.ndarray]:
         """What the next steps depend on."""
         found = {"q": self.modes.q, "v": self.modes.v}

@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 import os
 from dataclasses import asdict
+from functools import cached_property
 
 import numpy as np
 
@@ -13,11 +14,15 @@ from taichifem.clock import Clock
 from taichifem.description import Collider, Scene
 from taichifem.errors import Diverged, InputError
 from taichifem.integrators.step import StepReport
-from taichifem.mesh.connectivity import pieces
+from taichifem.layout import lay_out
+from taichifem.mesh.connectivity import boundary_faces, pieces
 from taichifem.reduced.modal_body import ModalBody
 from taichifem.reduced.obstacles import Obstacles
 from taichifem.reduced.parts import Parts, linear_twin, take_apart
+from taichifem.reduced.surface_body import SurfaceBody
+from taichifem.reduced.surface_models import BoundarySurface, CondensedSurface
 from taichifem.stats import Stats, figures
+from taichifem.supports import check_supports
 from taichifem.surroundings import pose
 from taichifem.timing import PhaseTimer
 
@@ -42,12 +47,19 @@ class ReducedSimulation:
         self._clock = Clock(fps=scene.fps, substeps=scene.substeps or 1)
         self._twin = linear_twin(scene)
         self._obstacles = Obstacles(scene)
+        if scene.integrator == "quasi-static":
+            check_supports(scene, lay_out(scene))
         self.bodies = [self._body(parts) for parts in take_apart(scene, self._twin)]
         self._timer = PhaseTimer()
         self._stats: Stats | None = None
 
-    def _body(self, parts: Parts) -> ModalBody:
-        return ModalBody(parts, dt=self.dt, precision=self.precision)
+    def _body(self, parts: Parts) -> ModalBody | SurfaceBody:
+        if parts.material.model == "modal":
+            return ModalBody(parts, dt=self.dt, precision=self.precision)
+        if parts.material.model == "bem":
+            return SurfaceBody(parts, dt=self.dt, model=BoundarySurface(parts))
+        still = self.scene.integrator == "quasi-static"
+        return SurfaceBody(parts, dt=self.dt, model=CondensedSurface(parts, None if still else self.dt))
 
     # Time
 
@@ -195,7 +207,20 @@ class ReducedSimulation:
         displacement = np.concatenate([body.displacement for body in self.bodies])
         self._twin.set_positions(self.rest_positions + displacement)
         turns = np.array([body.rotation for body in self.bodies])[self.cell_bodies]
-        return turns @ self._twin.cauchy_stress() @ turns.transpose(0, 2, 1)
+        stress = turns @ self._twin.cauchy_stress() @ turns.transpose(0, 2, 1)
+        for b, body in enumerate(self.bodies):
+            # Boundary elements know the stress of the surface: elements that lie there have it.
+            found = body.surface_stress()
+            if found is not None:
+                stress[self._surface_cells[self.surface_bodies == b]] = found
+        return stress
+
+    @cached_property
+    def _surface_cells(self) -> np.ndarray:
+        """The element of each triangle of the surface (k,)."""
+        faces, owner = boundary_faces(self.cells)
+        cell_of = dict(zip(map(frozenset, faces.tolist()), owner.tolist(), strict=True))
+        return np.array([cell_of[frozenset(face)] for face in self.surface.tolist()])
 
     def von_mises(self) -> np.ndarray:
         """Equivalent (von Mises) stress of each element (m,) [Pa]."""
@@ -278,7 +303,23 @@ def _check(scene: Scene) -> None:
         damping = {(m.mass_damping, m.stiffness_damping) for m in materials}
         if len(damping) > 1:
             raise InputError(f"{label}: its regions are damped differently: give all the same damping")
-        if body.material.model == "modal" and scene.integrator == "quasi-static":
-            raise InputError(
-                f'{label}: model "modal" swings, and integrator "quasi-static" has no inertia: use model = "condensed"'
-            )
+        _check_integrator(label, body.material.model, scene.integrator)
+        if body.material.model == "bem" and len({(m.youngs, m.poisson, m.density) for m in materials}) > 1:
+            raise InputError(f'{label}: boundary elements are for one material: use model = "condensed" for several')
+
+
+def _check_integrator(label: str, model: str, integrator: str) -> None:
+    if model == "modal" and integrator == "quasi-static":
+        raise InputError(
+            f'{label}: model "modal" swings, and integrator "quasi-static" has no inertia: use model = "condensed"'
+        )
+    if model == "bem" and integrator != "quasi-static":
+        raise InputError(
+            f'{label}: model "bem" has no inertia, and integrator {integrator!r} has: use integrator = "quasi-static", '
+            'or model = "condensed"'
+        )
+    if model == "condensed" and integrator not in ("backward-euler", "quasi-static"):
+        raise InputError(
+            f'{label}: model "condensed" knows integrators "backward-euler" and "quasi-static", not {integrator!r}: '
+            "use one of them"
+        )

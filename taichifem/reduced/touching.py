@@ -6,11 +6,11 @@ import numpy as np
 
 from taichifem.reduced.contact import contact_forces, frames_of, stopping_impulses
 
-PASSES = 4
-MOST = 160
+PASSES = 5
+MOST = 40
 """Contacts that are added in a pass at most: a body of some dozens of coordinates needs no more."""
 
-CELLS = 8
+CELLS = 6
 
 PRECISE = 1e-5
 """Error of a gap [m] that another pass is made for."""
@@ -91,18 +91,18 @@ class Touch:
         answer = J @ compliance @ J.T
         free = end - (answer @ self.forces.ravel()).reshape(-1, 3)
         friction = self._obstacles.friction[self.which]
-        self.forces = contact_forces(answer, free, friction)
+        self.forces = contact_forces(answer, free, friction, self.forces)
         # What is inside already is pushed out if contact has taken enough energy to pay for it.
         begin = self._obstacles.gaps(self._obstacles.table(time, dt), before[p], before[p])[0][at, self.which]
         begin = np.minimum(begin, 0.0)
         flat = self.forces.ravel()
         if flat @ (answer @ flat + free.ravel()) - self.forces[:, 0] @ begin > self.dissipated:
-            self.forces = contact_forces(answer, free - np.column_stack([begin, 0 * begin, 0 * begin]), friction)
+            self.forces = contact_forces(answer, free - np.column_stack([begin, 0 * begin, 0 * begin]), friction, self.forces)
         return J.T @ self.forces.ravel()
 
     def _paid(self, body, push, contact, reached, alone, dt) -> np.ndarray:
         """The contact forces, or a part of them that takes no more energy than contact has dissipated."""
-        for share in (1.0, 0.5, 0.0):
+        for share in (1.0, 0.95, 0.85, 0.7, 0.5, 0.25, 0.0):
             part = share * contact
             work = body.work(part, reached if share == 1 else body.trial(dt, push + part), alone)
             if work <= self.dissipated:

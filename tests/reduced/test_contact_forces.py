@@ -3,7 +3,13 @@
 import numpy as np
 import pytest
 
+from taichifem import runtime
 from taichifem.reduced.contact import contact_forces, frames_of, stopping_impulses
+
+
+@pytest.fixture(scope="module", autouse=True)
+def taichi():
+    runtime.start()
 
 
 def test_frames_are_right_handed():
@@ -18,7 +24,7 @@ def test_frames_are_right_handed():
 def test_a_point_sticks_or_slides(slip, force):
     """Unit compliance: the normal force closes the gap, friction stops the slip or is mu N."""
     found = contact_forces(np.eye(3), np.array([[-1.0, slip, 0.0]]), np.array([0.5]))
-    np.testing.assert_allclose(found, [[1.0, force, 0.0]], atol=1e-6)
+    np.testing.assert_allclose(found, [[1.0, force, 0.0]], atol=1e-4)
 
 
 def test_nothing_pulls():
