@@ -7,6 +7,7 @@ where they are reactions, so that edges at which given tractions jump are no tro
 
 from __future__ import annotations
 
+from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
@@ -59,8 +60,6 @@ class BoundaryElements:
                 to = self.triangles[:, corner]
                 for target, source in ((self.G, U), (self.H, T)):
                     _add_columns(target[part], to, source[:, :, corner].transpose(0, 2, 1, 3))
-        for matrix in (self.H, self.G):
-            assert matrix.shape == (n, 3, n, 3)
         # A shift has no tractions: that gives the singular parts. Nor has a turn: what is left of one is the error of
         # the quadrature, and is taken out.
         self.H[np.arange(n), :, np.arange(n), :] = 0
@@ -145,27 +144,48 @@ class BoundaryElements:
         local[:, 2, :] = local[:, :, 2] = pushed
         return axes.transpose(0, 2, 1) @ local @ axes
 
-    def inner_displacement(
-        self, places: np.ndarray, displacement: np.ndarray, tractions: np.ndarray, around: np.ndarray
-    ) -> np.ndarray:
-        """Displacement (m,3) [m] at places (m,3) inside (Somigliana's identity).
-
-        displacement (n,3) [m] of the vertices; tractions (k,3) [Pa] on triangles and `around` vertices (n,3).
-        """
-        if not len(places):
-            return np.zeros((0, 3))
-        found, rows = np.zeros((len(places), 3)), max(1, CHUNK // (54 * len(self.triangles)))
-        corner_u = displacement[self.triangles]
-        corner_t = around[self.triangles] + tractions[:, None]
-        for first in range(0, len(places), rows):
-            count = min(rows, len(places) - first)
+    def inside(self, places: np.ndarray) -> Inside:
+        """How places (m,3) [m] inside follow the surface (Somigliana's identity)."""
+        m, n, k = len(places), len(self.points), len(self.triangles)
+        by_displacement, by_vertex = np.zeros((2, m, 3, n, 3))
+        by_face = np.zeros((m, 3, k, 3))
+        rows = max(1, CHUNK // (54 * k))
+        for first in range(0, m, rows):
+            part = slice(first, min(first + rows, m))
             U, T = integrals(
-                places, self.points, self.triangles,
-                mu=self.mu, nu=self.poisson, first=first, rows=count, vertices=False,
+                places,
+                self.points,
+                self.triangles,
+                mu=self.mu,
+                nu=self.poisson,
+                first=first,
+                rows=part.stop - first,
+                vertices=False,
             )
-            found[first : first + count] = np.einsum("mkcab,kcb->ma", U, corner_t)
-            found[first : first + count] -= np.einsum("mkcab,kcb->ma", T, corner_u)
-        return found
+            by_face[part] = U.sum(axis=2).transpose(0, 2, 1, 3)
+            for corner in range(3):
+                to = self.triangles[:, corner]
+                _add_columns(by_vertex[part], to, U[:, :, corner].transpose(0, 2, 1, 3))
+                _add_columns(by_displacement[part], to, -T[:, :, corner].transpose(0, 2, 1, 3))
+        # Inside a body that is shifted, all is.
+        excess = by_displacement.sum(axis=2) - np.eye(3)
+        by_displacement -= excess[:, :, None, :] / n
+        return Inside(*(block.reshape(3 * m, -1) for block in (by_displacement, by_vertex, by_face)))
+
+
+@dataclass(frozen=True)
+class Inside:
+    """Displacement of m places by that of the n vertices (3m,3n), by tractions around them (3m,3n), and by tractions
+    on the k triangles (3m,3k)."""
+
+    by_displacement: np.ndarray
+    by_vertex: np.ndarray
+    by_face: np.ndarray
+
+    def displacement(self, u: np.ndarray, around: np.ndarray, faces: np.ndarray) -> np.ndarray:
+        """(m,3) [m] for displacements (n,3) and tractions (n,3), (k,3)."""
+        found = self.by_displacement @ u.ravel() + self.by_vertex @ around.ravel()
+        return (found + self.by_face @ faces.ravel()).reshape(-1, 3)
 
 
 def _add_columns(target: np.ndarray, to: np.ndarray, values: np.ndarray) -> None:

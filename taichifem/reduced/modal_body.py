@@ -119,6 +119,19 @@ class ModalBody:
     def surface_stress(self) -> None:
         """The elements know it as well."""
 
+    @property
+    def finite(self) -> bool:
+        """Is the state made of numbers?"""
+        return all(np.isfinite(values).all() for values in self.state().values())
+
+    def keep(self) -> Trial:
+        """The state, for `take_back`."""
+        return Trial(self.frame, self.modes.q, self.modes.v)
+
+    def take_back(self, kept: Trial) -> None:
+        """Undo a step."""
+        self.frame, self.modes.q, self.modes.v = kept
+
     def state(self) -> dict[str, np.ndarray]:
         """What the next steps depend on."""
         found = {"q": self.modes.q, "v": self.modes.v}

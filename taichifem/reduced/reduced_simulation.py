@@ -95,10 +95,10 @@ class ReducedSimulation:
         gravity = np.asarray(self.scene.gravity, dtype=float)
         with self._timer.phase("step"):
             for body in self.bodies:
-                before = body.state()
+                before = body.keep()
                 body.advance(self.dt, self.time, gravity, self._obstacles)
-                if not all(np.isfinite(values).all() for values in body.state().values()):
-                    body.set_state(before, self.time)
+                if not body.finite:
+                    body.take_back(before)
                     raise Diverged(f"the simulation diverged at t = {self.time:.4g} s: a coordinate is not finite")
         self._clock.tick()
 

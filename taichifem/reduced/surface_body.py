@@ -6,7 +6,6 @@ import numpy as np
 
 from taichifem.errors import InputError
 from taichifem.layout import Group
-from taichifem.reduced.compliance import Compliance
 from taichifem.reduced.contact import contact_forces, frames_of
 from taichifem.reduced.parts import Parts
 from taichifem.reduced.surface_models import BoundarySurface, CondensedSurface
@@ -24,7 +23,8 @@ class SurfaceBody:
         self._rest = parts.rest[nodes]
         self.u = np.zeros(3 * len(nodes))
         self.v = parts.velocities[nodes].ravel() if isinstance(model, CondensedSurface) else 0 * self.u
-        self.forces = np.zeros_like(self.u)  # of pins, handles and contact [N]
+        self._forces: np.ndarray | None = np.zeros_like(self.u)
+        self._asked: np.ndarray | None = None
         self.contacts = 0
         self._groups = [self._seen(group) for group in (*parts.pins, *parts.handles)]
         self._active: list[bool] | None = None
@@ -70,13 +70,26 @@ class SurfaceBody:
             return self.model.surface_stress(self.u, self.forces)
         return None
 
+    @property
+    def finite(self) -> bool:
+        """Is the state made of numbers?"""
+        return bool(np.isfinite(self.u).all() and np.isfinite(self.v).all())
+
+    def keep(self) -> tuple[np.ndarray, np.ndarray]:
+        """The state, for `take_back`."""
+        return self.u, self.v
+
+    def take_back(self, kept: tuple[np.ndarray, np.ndarray]) -> None:
+        """Undo a step."""
+        self.u, self.v = kept
+
     def state(self) -> dict[str, np.ndarray]:
         """What the next steps depend on."""
         return {"u": self.u, "v": self.v, "forces": self.forces}
 
     def set_state(self, state: dict[str, np.ndarray], time: float) -> None:
         """The inverse of `state`."""
-        self.u, self.v, self.forces = (state[name].copy() for name in ("u", "v", "forces"))
+        self.u, self.v, self._forces = (state[name].copy() for name in ("u", "v", "forces"))
 
     # Steps
 
@@ -88,13 +101,25 @@ class SurfaceBody:
         free, out_of_balance = self.model.free(gravity, {k: s for k, s in loads.items() if s}, self.u, self.v)
         target = np.concatenate([np.zeros(0), *(self._target(k, end) for k in self._acting)])
         stretch = target - free[self._axes]
-        alone = free + self._moved_by @ stretch + self._shifted_by @ out_of_balance
-        pushed, axes = self._contact(alone, dt, time, obstacles)
-        new = alone + self._base.matrix[:, axes] @ pushed
-        self.forces = np.zeros_like(new)
-        self.forces[axes] = pushed
-        self.forces[self._axes] += self._reactions(stretch, out_of_balance, axes, pushed)
+        asked = np.concatenate([free, stretch, out_of_balance])
+        if self._asked is None or not np.array_equal(asked, self._asked):
+            self._asked = asked
+            self._alone = free + self._moved_by @ stretch + self._shifted_by @ out_of_balance
+        pushed, axes = self._contact(self._alone, dt, time, obstacles)
+        new = self._alone + pushed @ self._columns[axes]
+        self._last = stretch, out_of_balance, axes, pushed
+        self._forces = None
         self.v, self.u = (new - self.u) / dt, new
+
+    @property
+    def forces(self) -> np.ndarray:
+        """Of pins, handles and contact on the surface (3s,) [N] in the last step."""
+        if self._forces is None:
+            stretch, out_of_balance, axes, pushed = self._last
+            self._forces = np.zeros_like(self.u)
+            self._forces[axes] = pushed
+            self._forces[self._axes] += self._reactions(stretch, out_of_balance, axes, pushed)
+        return self._forces
 
     def _hold(self, active: list[bool]) -> None:
         """Fold what pins and handles hold now into the compliance: an update of low rank, no new factorisation."""
@@ -113,8 +138,9 @@ class SurfaceBody:
             self._holding = self.model.compliance.holding(self._axes, self._softness)
         except InputError as error:
             raise InputError(f"{self.parts.label}: {error}") from None
-        self._base: Compliance
-        self._base, self._moved_by, self._shifted_by = self.model.compliance.held_for_good(self._axes, self._softness)
+        base, self._moved_by, self._shifted_by = self.model.compliance.held_for_good(self._axes, self._softness)
+        self._columns = np.ascontiguousarray(base.matrix.T)  # a row: what a force on one axis does
+        self._asked = None
 
     def _target(self, k: int, time: float) -> np.ndarray:
         group, nodes = self._groups[k]
@@ -159,13 +185,13 @@ class SurfaceBody:
             )
             local = contact_forces(answer, end, obstacles.friction[which])
             pushed = np.einsum("mba,mb->ma", frames, local).ravel()
-            after = self._rest + (alone + self._base.matrix[:, axes] @ pushed).reshape(-1, 3)
+            after = self._rest + (alone + pushed @ self._columns[axes]).reshape(-1, 3)
         self.contacts = int((np.abs(pushed.reshape(-1, 3)).sum(axis=1) > 0).sum())
         return _summed(axes, pushed)
 
     def _gather(self, axes: np.ndarray) -> np.ndarray:
         m = len(axes) // 3
-        return self._base.matrix[np.ix_(axes, axes)].reshape(m, 3, m, 3)
+        return self._columns[axes][:, axes].T.reshape(m, 3, m, 3)
 
 
 def _summed(axes: np.ndarray, pushed: np.ndarray) -> tuple[np.ndarray, np.ndarray]:

@@ -12,7 +12,7 @@ from functools import cached_property
 import numpy as np
 
 from taichifem.errors import InputError
-from taichifem.reduced.boundary_elements import BoundaryElements
+from taichifem.reduced.boundary_elements import BoundaryElements, Inside
 from taichifem.reduced.compliance import Compliance
 from taichifem.reduced.condensation import Condensation
 from taichifem.reduced.parts import Parts
@@ -40,9 +40,14 @@ class CondensedSurface:
             self._drag = material.mass_damping * mass + material.stiffness_damping * self._body.stiffness
             self._mass = mass
         self._inner = np.zeros((len(self._body.inner), 3))
+        self._acting: tuple | None = None
 
     def free(self, gravity: np.ndarray, shares: Shares, u: np.ndarray, v: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """Displacement (3s,) [m] by the loads and, in motion, inertia, with what is out of balance (r,)."""
+        acting = gravity.tolist(), dict(shares)
+        if self._dt is None and acting == self._acting:
+            return self._free
+        self._acting = acting
         forces = self._parts.masses[:, None] * gravity
         for k, share in shares.items():
             forces = forces + share * self._parts.loads[k].forces
@@ -51,7 +56,8 @@ class CondensedSurface:
             load = load + (self._mass @ (u / self._dt + v) + self._drag @ u) / self._dt
         elif len(self._body.inner):
             self._inner = self._body.inner_displacement(0 * u, forces)
-        return self.compliance.matrix @ load, self.compliance.balance @ load
+        self._free = self.compliance.matrix @ load, self.compliance.balance @ load
+        return self._free
 
     def everywhere(self, u: np.ndarray, forces: np.ndarray) -> np.ndarray:
         """Displacement of all nodes (n,3) for that of the surface (3s,)."""
@@ -93,6 +99,7 @@ class BoundarySurface:
         self._by_force = by_force
         self.tractions = np.zeros((len(parts.surface), 3))
         self._gravity = np.zeros(3)
+        self._acting: tuple | None = None
         self._inner = np.setdiff1d(np.arange(len(parts.rest)), self.nodes)
 
     @cached_property
@@ -111,6 +118,12 @@ class BoundarySurface:
 
     def free(self, gravity: np.ndarray, shares: Shares, u: np.ndarray, v: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """Displacement (3s,) [m] by the loads, with what is out of balance (6,)."""
+        acting = gravity.tolist(), dict(shares)
+        if acting != self._acting:
+            self._acting, self._free = acting, self._loaded(gravity, shares)
+        return self._free
+
+    def _loaded(self, gravity: np.ndarray, shares: Shares) -> tuple[np.ndarray, np.ndarray]:
         e = self.elements
         tractions = np.zeros((len(e.triangles), 3))
         for k, share in shares.items():
@@ -145,9 +158,15 @@ class BoundarySurface:
         found[self.nodes] = u.reshape(-1, 3)
         around = (self._by_force * forces).reshape(-1, 3)
         own = found[self.nodes] - self._hanging(e.points)
-        found[self._inner] = e.inner_displacement(rest[self._inner], own, self.tractions, around)
-        found[self._inner] += self._hanging(rest[self._inner])
+        if len(self._inner):
+            found[self._inner] = self._inside.displacement(own, around, self.tractions)
+            found[self._inner] += self._hanging(rest[self._inner])
         return found
+
+    @cached_property
+    def _inside(self) -> Inside:
+        """For whoever asks for inner nodes: made when that happens first."""
+        return self.elements.inside(self._parts.rest[self._inner])
 
     def velocities(self, v: np.ndarray) -> np.ndarray:
         """Of all nodes (n,3) [m/s]: inner ones do not count, the model has no inertia."""
