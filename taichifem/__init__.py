@@ -15,7 +15,7 @@ _HOME = {
         "PlaneCollider Pressure Scene SphereCollider SphereRegion Traction View"
     ),
     "taichifem.errors": "Diverged InputError",
-    "taichifem.mesh": "TetMesh TriMesh",
+    "taichifem.mesh": "EmbeddedSurface TetMesh TriMesh",
     "taichifem.scene": "preset",
     "taichifem.factory": "simulate",
     "taichifem.simulation": "Simulation",

@@ -174,8 +174,9 @@ def compare(ctx: click.Context, scene: str, **options: Any) -> None:
 @click.argument("source", metavar="IN")
 @click.option("-o", "--output", type=FILE, metavar="OUT", help="Where to write: .vtu, .vtk, .msh, .mesh, .inp ...")
 @click.option("--tets", type=click.IntRange(min=10), metavar="N", help="About how many tetrahedra fill a surface.")
+@click.option("--cage", type=click.IntRange(min=5), metavar="N", help="About how many tetrahedra enclose a surface.")
 @click.option("--planar", is_flag=True, help="Take IN for a flat mesh of triangles, for two-dimensional scenes.")
-def mesh(source: str, output: Path | None, tets: int | None, planar: bool) -> None:
+def mesh(source: str, output: Path | None, tets: int | None, cage: int | None, planar: bool) -> None:
     """Check, convert or make a mesh of tetrahedra, or of triangles in the plane.
 
     Prints how good the mesh IN is, and writes it to OUT if that is given.
@@ -188,13 +189,14 @@ def mesh(source: str, output: Path | None, tets: int | None, planar: bool) -> No
     Examples:
       taichifem mesh duck.ele
       taichifem mesh spot.obj --tets 5000 -o spot.vtu
+      taichifem mesh spot.obj --cage 500 -o cage.vtu        any surface: what embed = "spot.obj" rides in
       taichifem mesh sheet.msh --planar -o sheet.vtu
     """
     from taichifem.mesh import TetMesh, TriMesh, report
 
-    if planar and tets is not None:
-        raise click.UsageError("--tets fills a surface with tetrahedra: leave it out with --planar")
-    body = TriMesh.from_file(source) if planar else TetMesh.from_file(source, tets=tets)
+    if planar and (tets is not None or cage is not None):
+        raise click.UsageError("--tets and --cage make tetrahedra: leave them out with --planar")
+    body = TriMesh.from_file(source) if planar else TetMesh.from_file(source, tets=tets, cage=cage)
     click.echo(report(body))
     if output is not None:
         body.write(output)

@@ -15,7 +15,7 @@ from taichifem.description.motion import Motion, rotation_matrix
 from taichifem.description.regions import Region
 from taichifem.description.view import Camera, View
 from taichifem.errors import InputError
-from taichifem.mesh import Mesh
+from taichifem.mesh import EmbeddedSurface, Mesh
 
 INTEGRATORS = ("backward-euler", "backward-euler-newton", "bdf2", "newmark", "symplectic-euler", "quasi-static")
 SOLVERS = ("multilevel", "block-jacobi")
@@ -73,6 +73,7 @@ class Body:
     pins: regions to hold, or Pin objects.  handles: springs that pull.  forces, tractions, pressures: loads.
     A planar mesh (triangles) lies in the plane y = 0, in plane strain; `thickness` [m] is its extent along y. It can
     be turned about y only.
+    embed: a surface that rides in the mesh, placed like it, and is drawn, exported and recorded in its place.
     """
 
     mesh: Mesh
@@ -91,8 +92,11 @@ class Body:
     tractions: Sequence[Traction] = ()
     pressures: Sequence[Pressure] = ()
     thickness: float = 1.0
+    embed: EmbeddedSurface | None = None
 
     def __post_init__(self) -> None:
+        if self.embed is not None and self.mesh.dimension == 2:
+            raise InputError("embed rides in tetrahedra, and the mesh is planar: leave it out")
         check.number("scale", self.scale, above=0)
         check.number("thickness", self.thickness, above=0, unit="m")
         if not np.linalg.norm(check.vector("axis", self.axis)) > 0:
@@ -122,6 +126,10 @@ class Body:
         points = self.mesh.points
         if self.mesh.dimension == 2:
             points = np.column_stack([points[:, 0], np.zeros(len(points)), points[:, 1]])
+        return self.placed(points)
+
+    def placed(self, points: np.ndarray) -> np.ndarray:
+        """Points (n,3) of the mesh's own coordinates in the world [m]."""
         turned = self.scale * points @ rotation_matrix(self.axis, self.angle).T
         return turned + np.asarray(self.position, dtype=float)
 
