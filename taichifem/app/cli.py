@@ -216,6 +216,7 @@ def info() -> None:
 @click.option("--stiffness", default="1e6", show_default=True, help="Young's moduli [Pa], separated by commas.")
 @click.option("--poisson", type=float, default=0.4, show_default=True, help="Poisson's ratio.")
 @click.option("--model", type=click.Choice(MODELS), default="corotational", show_default=True, help="Of the material.")
+@click.option("--modes", type=click.IntRange(min=1), default=20, show_default=True, help="Of --model modal.")
 @click.option(
     "--plasticity",
     type=click.Choice(PLASTICITIES),
@@ -257,6 +258,7 @@ def bench(**options: Any) -> None:
       taichifem bench --sizes 1k,5k --no-cold
       taichifem bench --stiffness 1e5,1e6,1e7 --json bench.json
       taichifem bench --sizes 20k --plasticity von-mises
+      taichifem bench --sizes 1k,20k,100k --model modal --modes 50
       taichifem bench --sizes 1k,5k,20k,100k,1m --plot bench.png     needs: pip install "taichifem[plot]"
       taichifem bench --sizes 5k --against mujoco,newton --peer-python newton=~/newton/bin/python
     """
