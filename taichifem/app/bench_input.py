@@ -68,7 +68,12 @@ class Plan:
         self.solvers = _each(options.solver, lambda text: _known("--solver", text, SOLVERS))
         self.peers = _each(options.against, lambda text: _known("--against", text, PEERS)) if options.against else []
         self.interpreters = interpreters(options.peer_python)
-        self.material = {"model": options.model, "modes": options.modes, "plasticity": options.plasticity, "poisson": options.poisson}
+        self.material = {
+            "model": options.model,
+            "modes": options.modes,
+            "plasticity": options.plasticity,
+            "poisson": options.poisson,
+        }
         self.machine = {"precision": options.precision, "arch": options.arch, "threads": options.threads}
         if options.plot is not None:
             need_plot(options.plot)

@@ -68,7 +68,14 @@ def show_modes(name: str, options: ModesOptions) -> list[dict]:
         modes = modes_of(parts, count, basis=options.basis or material.basis)
         found.append((parts, modes))
         rows += _rows(parts, modes)
-    listing = table("body", "mode", "frequency [Hz]", "period [s]", "damping", right=("mode", "frequency [Hz]", "period [s]", "damping"))
+    listing = table(
+        "body",
+        "mode",
+        "frequency [Hz]",
+        "period [s]",
+        "damping",
+        right=("mode", "frequency [Hz]", "period [s]", "damping"),
+    )
     for row in rows:
         damping = "free" if row["damping_ratio"] is None else f"{100 * row['damping_ratio']:.3g} %"
         period = "-" if row["hertz"] == 0 else f"{1 / row['hertz']:.4g}"

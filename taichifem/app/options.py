@@ -149,7 +149,9 @@ static_options = together(
 
 modes_options = together(
     set_option,
-    click.option("--modes", "count", type=click.IntRange(min=1), metavar="N", help="Of each body.  [default: the scene's]"),
+    click.option(
+        "--modes", "count", type=click.IntRange(min=1), metavar="N", help="Of each body.  [default: the scene's]"
+    ),
     click.option("--basis", type=click.Choice(BASES), help="What they are made of.  [default: the scene's]"),
     click.option(
         "-o",

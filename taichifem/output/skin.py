@@ -62,7 +62,9 @@ class Skin:
         for rider in self._riding:
             triangles, element, weight = rider.corners(cells, np.asarray(simulation.cell_pieces))
             pieces = np.asarray(simulation.cell_pieces)[rider.home]
-            parts.append((triangles + first, np.full(len(triangles), rider.body), pieces, np.zeros(len(triangles), bool)))
+            parts.append(
+                (triangles + first, np.full(len(triangles), rider.body), pieces, np.zeros(len(triangles), bool))
+            )
             colors.append(rider.colors)
             elements.append(element), weights.append(weight)
             first += len(element)
@@ -86,7 +88,9 @@ def _plain(simulation: Any) -> Seen:
     colors = np.full((len(triangles), 3), np.nan)
     asked = simulation.scene.view.color == "piece"
     pieces = simulation.surface_pieces if asked else np.zeros(len(triangles), dtype=int)
-    return Seen(triangles, nobody, np.asarray(simulation.surface_bodies), pieces, np.asarray(simulation.crack_faces), colors)
+    return Seen(
+        triangles, nobody, np.asarray(simulation.surface_bodies), pieces, np.asarray(simulation.crack_faces), colors
+    )
 
 
 def _riders(simulation: Any) -> list[_Rider]:
@@ -111,7 +115,9 @@ class _Rider:
         self._home = embed(self.points[self.triangles].mean(axis=1), self._nodes, self._whole).element
         self.home = cells[self._home]
         shades = body.embed.colors
-        self.colors = np.full((len(self.triangles), 3), np.nan) if shades is None else shades[self.triangles].mean(axis=1)
+        self.colors = (
+            np.full((len(self.triangles), 3), np.nan) if shades is None else shades[self.triangles].mean(axis=1)
+        )
 
     def _in(self, points: np.ndarray, element: np.ndarray) -> np.ndarray:
         corners = self._nodes[self._whole[element]]

@@ -53,8 +53,16 @@ def _point(P: ti.template(), t, c):
 
 @ti.kernel
 def _integrate(
-    X: _array(), own: _array(), P: _array(), seven: _array(), gauss: _array(), mu: ti.f64, nu: ti.f64,
-    first: ti.i32, U: _array(), T: _array(),
+    X: _array(),
+    own: _array(),
+    P: _array(),
+    seven: _array(),
+    gauss: _array(),
+    mu: ti.f64,
+    nu: ti.f64,
+    first: ti.i32,
+    U: _array(),
+    T: _array(),
 ):
     """U, T (rows,triangles,3 corners,3,3) for collocation points from `first` on; own (k,3): the triangles' vertices."""
     for row, t in ti.ndrange(U.shape[0], P.shape[0]):
@@ -94,7 +102,7 @@ def _integrate(
             parts = ti.min(ti.max(ti.cast(ti.ceil(1.2 * size / away), ti.i32), 1), FINEST)
             for i, j in ti.ndrange(parts, parts):
                 for half in range(2):
-                    if half == 0 and i + j < parts or half == 1 and i + j < parts - 1:
+                    if (half == 0 and i + j < parts) or (half == 1 and i + j < parts - 1):
                         for g in range(seven.shape[0]):
                             s, v = seven[g, 0], seven[g, 1]
                             if half == 1:
@@ -115,7 +123,14 @@ def _integrate(
 
 
 def integrals(
-    places: np.ndarray, points: np.ndarray, triangles: np.ndarray, *, mu: float, nu: float, first: int, rows: int,
+    places: np.ndarray,
+    points: np.ndarray,
+    triangles: np.ndarray,
+    *,
+    mu: float,
+    nu: float,
+    first: int,
+    rows: int,
     vertices: bool = True,
 ) -> tuple[np.ndarray, np.ndarray]:
     """Integrals of U phi_c and T phi_c over each triangle, (rows,k,3,3,3) each, for places `first` to `first` + rows.
@@ -130,7 +145,15 @@ def integrals(
     U, T = np.zeros((2, rows, len(triangles), 3, 3, 3))
     with runtime.precision_of("f64"):
         _integrate(
-            np.ascontiguousarray(places, dtype=np.float64), np.ascontiguousarray(own, dtype=np.int32),
-            np.ascontiguousarray(points[triangles], dtype=np.float64), _SEVEN, gauss, mu, nu, first, U, T,
+            np.ascontiguousarray(places, dtype=np.float64),
+            np.ascontiguousarray(own, dtype=np.int32),
+            np.ascontiguousarray(points[triangles], dtype=np.float64),
+            _SEVEN,
+            gauss,
+            mu,
+            nu,
+            first,
+            U,
+            T,
         )
     return U, T

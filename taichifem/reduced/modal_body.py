@@ -69,9 +69,14 @@ class ModalBody:
         self.modes.v = np.einsum("n,nak,na->k", parts.masses, self.shapes, relative)
         self._drag = material.mass_damping
         # At run time only rows of the surface are worked with, in the precision of the simulation.
-        self._skin = parts.skin
+        self._places, rows = self.local[parts.skin], self.shapes[parts.skin]
+        if parts.embedded is not None:
+            # The embedded surface meets colliders, by the modes of the mesh that it rides in.
+            places, lies = parts.embedded
+            self._places = places - (self.frame.origin if isinstance(self.frame, FreeFrame) else 0.0)
+            rows = lies.points(self.shapes.reshape(len(self.shapes), -1), parts.cells).reshape(len(places), 3, -1)
         real = np.float32 if precision == "f32" else np.float64
-        self._rows = np.ascontiguousarray(self.shapes[self._skin].reshape(-1, len(found.frequencies)), dtype=real)
+        self._rows = np.ascontiguousarray(rows.reshape(3 * len(rows), -1), dtype=real)
         self._moment = np.einsum("n,nak->ak", parts.masses, self.shapes)
         self._tensor = np.einsum("n,nb,nak->abk", parts.masses, self.local, self.shapes)
         self._loads = [_ModalLoad(load, self.shapes, self.local) for load in parts.loads]
@@ -207,22 +212,24 @@ class ModalBody:
     def skin(self, at: Trial | None = None) -> np.ndarray:
         """Points of the surface (s,3) [m] now, or at the end of a trial."""
         frame, q = (self.frame, self.modes.q) if at is None else (at.frame, at.q)
-        return self._at(frame, q, self.local[self._skin], self._rows)
+        return self._at(frame, q, self._places, self._rows)
 
     def levers(self, which: np.ndarray) -> np.ndarray:
         """How points of the skin (m,) move with the coordinates (m,3,r)."""
-        return self._levers(self._skin[which])
+        return self._levers(self._places[which], self._shapes_of(which))
 
-    def _levers(self, nodes: np.ndarray) -> np.ndarray:
-        shapes = self.shapes[nodes]
-        points = self._at(self.frame, self.modes.q, self.local[nodes], shapes.reshape(3 * len(nodes), -1))
+    def _shapes_of(self, which: np.ndarray) -> np.ndarray:
+        """Rows of points of the skin (m,3,k)."""
+        return self._rows.reshape(len(self._places), 3, -1)[which].astype(float)
+
+    def _levers(self, local: np.ndarray, shapes: np.ndarray) -> np.ndarray:
+        points = self._at(self.frame, self.modes.q, local, shapes.reshape(3 * len(local), -1))
         return np.concatenate([self.frame.levers(points), self.frame.rotation @ shapes], axis=2)
 
     def velocities_of(self, which: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """Places and velocities (m,3) of points of the skin (m,)."""
-        nodes = self._skin[which]
-        shapes = self.shapes[nodes]
-        points = self._at(self.frame, self.modes.q, self.local[nodes], shapes.reshape(3 * len(nodes), -1))
+        shapes = self._shapes_of(which)
+        points = self._at(self.frame, self.modes.q, self._places[which], shapes.reshape(3 * len(which), -1))
         return points, self.frame.velocity_at(points) + (shapes @ self.modes.v) @ self.frame.rotation.T
 
     def strike(self, impulse: np.ndarray) -> None:
@@ -240,7 +247,7 @@ class ModalBody:
         target = np.concatenate([self._target(group, time + dt) for group in acting])
         ahead = self.trial(dt, push)
         free = self._at(ahead.frame, ahead.q, self.local[nodes], self.shapes[nodes].reshape(3 * len(nodes), -1))
-        J = self._levers(nodes).reshape(3 * len(nodes), -1)
+        J = self._levers(self.local[nodes], self.shapes[nodes]).reshape(3 * len(nodes), -1)
         pulled = np.repeat(stiffness, 3)[:, None] * J
         return np.linalg.solve(
             np.eye(len(push)) + pulled.T @ J @ self.compliance(dt), pulled.T @ (target - free).ravel()

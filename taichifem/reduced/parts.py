@@ -9,6 +9,7 @@ import scipy.sparse
 
 from taichifem.description import Body, Load, Material, Pressure, Scene
 from taichifem.layout import Group, Layout, lay_out
+from taichifem.mesh.embedded import Embedding, embed
 from taichifem.processes.loading import Loading
 from taichifem.simulation import Simulation
 
@@ -27,7 +28,8 @@ class Parts:
     """A body of the scene by itself, nodes in its own order.
 
     rest (n,3) [m], masses (n,) [kg], velocities (n,3) [m/s] at the start, stiffness K (3n,3n) [N/m], surface (k,3)
-    outward triangles, skin: (s,) the nodes on it; pins and handles with nodes of this body.
+    outward triangles, skin: (s,) the nodes on it; pins and handles with nodes of this body; embedded: rest places (p,3)
+    [m] of the surface that rides in it, and where they lie, or None.
     """
 
     label: str
@@ -40,6 +42,8 @@ class Parts:
     pins: list[Group]
     handles: list[Group]
     loads: list[LoadField]
+    cells: np.ndarray
+    embedded: tuple[np.ndarray, Embedding] | None = None
 
     @property
     def skin(self) -> np.ndarray:
@@ -82,10 +86,19 @@ def take_apart(scene: Scene, twin: Simulation) -> list[Parts]:
                 surface=twin.surface[twin.surface_bodies == b] - first,
                 pins=_of_body(layout.pins, layout, first, last),
                 handles=_of_body(layout.handles, layout, first, last),
+                cells=np.asarray(body.mesh.cells),
+                embedded=_embedded(body),
                 loads=[replace(f, forces=f.forces[first:last]) for f in loads if f.forces[first:last].any()],
             )
         )
     return found
+
+
+def _embedded(body: Body) -> tuple[np.ndarray, Embedding] | None:
+    if body.embed is None:
+        return None
+    points = body.placed(np.asarray(body.embed.points))
+    return points, embed(points, body.placed_points(), np.asarray(body.mesh.cells))
 
 
 def _of_body(groups: list[Group], layout: Layout, first: int, last: int) -> list[Group]:

@@ -35,7 +35,7 @@ class SurfaceBody:
         seen = self.model.nodes[np.minimum(at, len(self.model.nodes) - 1)] == group.nodes
         if not seen.any():
             raise InputError(
-                f'{self.parts.label}: a pin or handle has inner nodes only: choose some of the surface, '
+                f"{self.parts.label}: a pin or handle has inner nodes only: choose some of the surface, "
                 'or use model = "linear"'
             )
         return group, at[seen]

@@ -36,28 +36,36 @@ class CondensedSurface:
             self.compliance = self._body.step_compliance(
                 dt, mass_damping=material.mass_damping, stiffness_damping=material.stiffness_damping
             )
+            # Where a step goes from where the last one was, worked out once: one product a step, two with damping.
             mass = self._body.mass()
-            self._drag = material.mass_damping * mass + material.stiffness_damping * self._body.stiffness
-            self._mass = mass
+            self._by_inertia = self.compliance.matrix @ mass / dt
+            self._by_drag = None
+            if material.mass_damping or material.stiffness_damping:
+                drag = material.mass_damping * mass + material.stiffness_damping * self._body.stiffness
+                self._by_drag = self.compliance.matrix @ drag / dt
         self._inner = np.zeros((len(self._body.inner), 3))
         self._acting: tuple | None = None
 
     def free(self, gravity: np.ndarray, shares: Shares, u: np.ndarray, v: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """Displacement (3s,) [m] by the loads and, in motion, inertia, with what is out of balance (r,)."""
         acting = gravity.tolist(), dict(shares)
-        if self._dt is None and acting == self._acting:
-            return self._free
-        self._acting = acting
+        if acting != self._acting:
+            self._acting, self._free = acting, self._loaded(gravity, shares)
+        found, out_of_balance = self._free
+        if self._dt is not None:
+            found = found + self._by_inertia @ (u / self._dt + v)
+            if self._by_drag is not None:
+                found += self._by_drag @ u
+        return found, out_of_balance
+
+    def _loaded(self, gravity: np.ndarray, shares: Shares) -> tuple[np.ndarray, np.ndarray]:
         forces = self._parts.masses[:, None] * gravity
         for k, share in shares.items():
             forces = forces + share * self._parts.loads[k].forces
+        if self._dt is None and len(self._body.inner):
+            self._inner = self._body.inner_displacement(np.zeros(3 * len(self.nodes)), forces)
         load = self._body.load(forces)
-        if self._dt is not None:
-            load = load + (self._mass @ (u / self._dt + v) + self._drag @ u) / self._dt
-        elif len(self._body.inner):
-            self._inner = self._body.inner_displacement(0 * u, forces)
-        self._free = self.compliance.matrix @ load, self.compliance.balance @ load
-        return self._free
+        return self.compliance.matrix @ load, self.compliance.balance @ load
 
     def everywhere(self, u: np.ndarray, forces: np.ndarray) -> np.ndarray:
         """Displacement of all nodes (n,3) for that of the surface (3s,)."""

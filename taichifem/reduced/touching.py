@@ -97,7 +97,9 @@ class Touch:
         begin = np.minimum(begin, 0.0)
         flat = self.forces.ravel()
         if flat @ (answer @ flat + free.ravel()) - self.forces[:, 0] @ begin > self.dissipated:
-            self.forces = contact_forces(answer, free - np.column_stack([begin, 0 * begin, 0 * begin]), friction, self.forces)
+            self.forces = contact_forces(
+                answer, free - np.column_stack([begin, 0 * begin, 0 * begin]), friction, self.forces
+            )
         return J.T @ self.forces.ravel()
 
     def _paid(self, body, push, contact, reached, alone, dt) -> np.ndarray:

@@ -57,7 +57,9 @@ def _is_table_list(hint: object) -> bool:
 
 def holds_dataclass(hint: object) -> bool:
     """Whether values of the type `hint` are, or contain, dataclasses."""
-    return (hasattr(hint, "__dataclass_fields__") and hint is not EmbeddedSurface) or any(map(holds_dataclass, get_args(hint)))
+    return (hasattr(hint, "__dataclass_fields__") and hint is not EmbeddedSurface) or any(
+        map(holds_dataclass, get_args(hint))
+    )
 
 
 def _singular(name: str) -> str:

@@ -74,7 +74,9 @@ class _Writer:
             return self.table(Pin(region=value))
         if isinstance(value, EmbeddedSurface):
             if value.file is None:
-                raise InputError("an embedded surface without a file cannot be written: make it by EmbeddedSurface.from_file")
+                raise InputError(
+                    "an embedded surface without a file cannot be written: make it by EmbeddedSurface.from_file"
+                )
             return self.file(value.file)
         if type(value) in _COLLIDER_TYPES:
             return {"type": _COLLIDER_TYPES[type(value)], **self.table(value)}

@@ -85,7 +85,9 @@ def test_rigid_motion_has_no_traction(unit_cube):
 def test_a_shift_of_what_is_held_shifts_all(unit_cube):
     body = unit_cube
     held = np.flatnonzero(body.points[:, 0] < 1e-9)
-    u = body.displacement(np.zeros((len(body.triangles), 3)), held=held, target=np.tile([0.1, 0.2, 0.3], (len(held), 1)))
+    u = body.displacement(
+        np.zeros((len(body.triangles), 3)), held=held, target=np.tile([0.1, 0.2, 0.3], (len(held), 1))
+    )
     np.testing.assert_allclose(u, np.broadcast_to([0.1, 0.2, 0.3], u.shape), atol=1e-10)
 
 

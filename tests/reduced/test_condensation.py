@@ -13,7 +13,9 @@ from taichifem.reduced.condensation import Condensation
 def bar():
     """K, masses, points, surface nodes, and random forces of a bar."""
     mesh = tf.TetMesh.bar(size=(1.0, 0.4, 0.4), cells=(8, 4, 4))
-    simulation = tf.Simulation(tf.Scene(bodies=[tf.Body(mesh=mesh, material=tf.Material(model="linear"))]), precision="f64")
+    simulation = tf.Simulation(
+        tf.Scene(bodies=[tf.Body(mesh=mesh, material=tf.Material(model="linear"))]), precision="f64"
+    )
     forces = np.random.default_rng(0).normal(size=mesh.points.shape)
     return simulation.stiffness(), simulation.masses, mesh.points, np.unique(mesh.surface()), forces
 

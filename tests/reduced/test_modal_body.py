@@ -15,7 +15,9 @@ SOFT = tf.Material(model="modal", modes=20, youngs=1e5, poisson=0.3)
 HELD = tf.BoxRegion(lower=(-1, -1, -1), upper=(1e-6, 1, 1))
 
 
-def scene_of(material=SOFT, *, colliders=(), gravity=(0, 0, -9.81), mesh=BAR, fps=60, integrator="backward-euler", **body):
+def scene_of(
+    material=SOFT, *, colliders=(), gravity=(0, 0, -9.81), mesh=BAR, fps=60, integrator="backward-euler", **body
+):
     body = tf.Body(mesh=mesh, material=material, **body)
     return tf.Scene(bodies=[body], colliders=colliders, gravity=gravity, fps=fps, integrator=integrator)
 
@@ -153,7 +155,9 @@ def test_forces_push_and_pressures_follow():
     simulation.advance(seconds=1.0)
     mass = simulation.masses.sum()
     assert simulation.stats.momentum[1] == pytest.approx(48.0, rel=1e-9)
-    assert simulation.positions[:, 1].mean() - simulation.rest_positions[:, 1].mean() == pytest.approx(24 / mass, rel=1e-3)
+    assert simulation.positions[:, 1].mean() - simulation.rest_positions[:, 1].mean() == pytest.approx(
+        24 / mass, rel=1e-3
+    )
     assert np.ptp(simulation.positions[:, 0]) < 0.6
 
 
@@ -192,11 +196,11 @@ def test_what_modal_bodies_refuse(change, message):
 
 
 def test_what_reduced_materials_refuse():
-    with pytest.raises(InputError, match='plasticity changes the body.*use model = "corotational"'):
+    with pytest.raises(InputError, match=r'plasticity changes the body.*use model = "corotational"'):
         replace(SOFT, plasticity="creep", yield_strain=0.1, creep_rate=1.0)
-    with pytest.raises(InputError, match='fracture changes the body.*use model = "corotational"'):
+    with pytest.raises(InputError, match=r'fracture changes the body.*use model = "corotational"'):
         replace(SOFT, fracture=tf.Fracture(toughness=1e4))
-    with pytest.raises(InputError, match="taichifem.simulate"):
+    with pytest.raises(InputError, match=r"taichifem\.simulate"):
         tf.Simulation(scene_of())
     mixed = scene_of()
     with pytest.raises(InputError, match="cannot share a scene"):

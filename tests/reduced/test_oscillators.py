@@ -40,7 +40,12 @@ def test_ten_thousand_steps_of_a_damped_cosine(dt):
 
 def test_steps_of_any_size_reach_the_same_place():
     w = np.geomspace(0.1, 1e4, 40)
-    for damping in ({}, {"mass_damping": 3.0}, {"stiffness_damping": 0.01}, {"mass_damping": 1.0, "stiffness_damping": 1.0}):
+    for damping in (
+        {},
+        {"mass_damping": 3.0},
+        {"stiffness_damping": 0.01},
+        {"mass_damping": 1.0, "stiffness_damping": 1.0},
+    ):
         once, often = Oscillators(w, **damping), Oscillators(w, **damping)
         once.q[:], often.q[:] = 0.2, 0.2
         once.v[:], often.v[:] = -1.0, -1.0
