@@ -96,8 +96,8 @@ def _reduced(row: dict) -> str:
     ours, full = row["ms"]["median"], row["full_ms"]["median"]
     what = f"{row['modes']} modes" if row["model"] == "modal" else row["model"]
     return (
-        f"{row['tets']:,} tets, E = {row['youngs']:g} Pa: {what} takes 1/{full / ours:.1f} of the {told(row['full_ms'])} "
-        "ms of the full linear bar beside it"
+        f"{row['tets']:,} tets, E = {row['youngs']:g} Pa: {what} takes 1/{full / ours:.1f} of the "
+        f"{told(row['full_ms'])} ms of the full linear bar beside it"
     )
 
 

@@ -98,7 +98,8 @@ class Material:
         if self.reduced and (self.plasticity != "none" or self.fracture is not None):
             what = "plasticity" if self.plasticity != "none" else "fracture"
             raise InputError(
-                f'{what} changes the body, and model {self.model!r} is worked out beforehand: use model = "corotational"'
+                f"{what} changes the body, and model {self.model!r} is worked out beforehand: "
+                'use model = "corotational"'
             )
 
     @property

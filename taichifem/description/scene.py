@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
+from functools import cached_property
 
 import numpy as np
 
@@ -16,6 +17,7 @@ from taichifem.description.regions import Region
 from taichifem.description.view import Camera, View
 from taichifem.errors import InputError
 from taichifem.mesh import EmbeddedSurface, Mesh
+from taichifem.mesh.embedded import Embedding, embed
 
 INTEGRATORS = ("backward-euler", "backward-euler-newton", "bdf2", "newmark", "symplectic-euler", "quasi-static")
 SOLVERS = ("multilevel", "block-jacobi")
@@ -97,6 +99,8 @@ class Body:
     def __post_init__(self) -> None:
         if self.embed is not None and self.mesh.dimension == 2:
             raise InputError("embed rides in tetrahedra, and the mesh is planar: leave it out")
+        if self.embed is not None:
+            self.embedding  # noqa: B018  (tells early where the surface reaches far out of the mesh)
         check.number("scale", self.scale, above=0)
         check.number("thickness", self.thickness, above=0, unit="m")
         if not np.linalg.norm(check.vector("axis", self.axis)) > 0:
@@ -120,6 +124,11 @@ class Body:
                 raise InputError(f"{name} {tuple(getattr(self, name))} leaves the plane of a planar body: y must be 0")
         if self.spin[0] or self.spin[2]:
             raise InputError(f"spin {tuple(self.spin)} turns a planar body out of its plane: only y may differ from 0")
+
+    @cached_property
+    def embedding(self) -> Embedding:
+        """Where the points of `embed` lie in the mesh."""
+        return embed(np.asarray(self.embed.points, dtype=float), self.mesh.points, self.mesh.cells)
 
     def placed_points(self) -> np.ndarray:
         """Rest positions of the nodes in the world (n,3) [m]."""

@@ -34,7 +34,7 @@ class Solid:
 
 @dataclass(frozen=True)
 class Surface:
-    """What a surface file holds: points (n, 3), triangles (k, 3), and colours of the points (n, 3) in [0, 1] or None."""
+    """What a surface file holds: points (n, 3), triangles (k, 3), colours of the points (n, 3) in [0, 1] or None."""
 
     points: np.ndarray
     triangles: np.ndarray

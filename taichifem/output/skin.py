@@ -110,8 +110,7 @@ class _Rider:
         self.body, self._of = number, cells
         self._nodes, self._whole = body.placed_points(), np.asarray(body.mesh.cells)
         self.points, self.triangles = body.placed(np.asarray(body.embed.points)), np.asarray(body.embed.triangles)
-        lies = embed(self.points, self._nodes, self._whole)
-        self._own, self._weights = lies.element, lies.weights
+        self._own, self._weights = body.embedding.element, body.embedding.weights
         self._home = embed(self.points[self.triangles].mean(axis=1), self._nodes, self._whole).element
         self.home = cells[self._home]
         shades = body.embed.colors

@@ -28,7 +28,7 @@ def frames_of(normals: np.ndarray) -> np.ndarray:
 
 @ti.kernel
 def _sweep(D: _array(), d: _array(), friction: _array(), most: _array(), f: _array(), pulls: ti.i32) -> ti.i32:
-    """Improve the forces f (m,3); returns the number of sweeps. pulls: normal forces of either sign, friction at `most`."""
+    """Improve the forces f (m,3); returns how often. pulls: normal forces of either sign, friction at `most`."""
     m = d.shape[0]
     done = 0
     ti.loop_config(serialize=True)

@@ -31,8 +31,8 @@ def turned(rotation: np.ndarray, angle: np.ndarray) -> np.ndarray:
 
 @dataclass(frozen=True)
 class FreeFrame:
-    """A rigid body: mass [kg], turns: inverse (3,3) of its inertia in the frame [kg m^2], velocity (3,) [m/s] of its centre of mass, which
-    is the origin, and angular momentum (3,) about it [kg m^2/s]."""
+    """A rigid body. mass [kg]; turns: inverse (3,3) of its inertia in the frame [1/(kg m^2)]; velocity (3,) [m/s] of
+    its centre of mass, which is the origin; momentum: angular (3,) about it [kg m^2/s]."""
 
     rotation: np.ndarray
     origin: np.ndarray

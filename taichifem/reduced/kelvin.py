@@ -64,7 +64,7 @@ def _integrate(
     U: _array(),
     T: _array(),
 ):
-    """U, T (rows,triangles,3 corners,3,3) for collocation points from `first` on; own (k,3): the triangles' vertices."""
+    """U, T (rows,triangles,3 corners,3,3) for places X from `first` on; own (k,3): vertices of the triangles."""
     for row, t in ti.ndrange(U.shape[0], P.shape[0]):
         x = ti.Vector([X[first + row, 0], X[first + row, 1], X[first + row, 2]])
         a, b, c = _point(P, t, 0), _point(P, t, 1), _point(P, t, 2)

@@ -9,7 +9,7 @@ import scipy.sparse
 
 from taichifem.description import Body, Load, Material, Pressure, Scene
 from taichifem.layout import Group, Layout, lay_out
-from taichifem.mesh.embedded import Embedding, embed
+from taichifem.mesh.embedded import Embedding
 from taichifem.processes.loading import Loading
 from taichifem.simulation import Simulation
 
@@ -97,8 +97,7 @@ def take_apart(scene: Scene, twin: Simulation) -> list[Parts]:
 def _embedded(body: Body) -> tuple[np.ndarray, Embedding] | None:
     if body.embed is None:
         return None
-    points = body.placed(np.asarray(body.embed.points))
-    return points, embed(points, body.placed_points(), np.asarray(body.mesh.cells))
+    return body.placed(np.asarray(body.embed.points)), body.embedding
 
 
 def _of_body(groups: list[Group], layout: Layout, first: int, last: int) -> list[Group]:

@@ -88,7 +88,7 @@ class CondensedSurface:
 class BoundarySurface:
     """Boundary elements on the surface of the mesh. Gravity enters by a particular solution, that of a hanging bar.
 
-    Pins and handles take hold of the surface only; around the edge of what they hold, reactions reach out by one element.
+    Pins and handles take hold of the surface only; around the edge of what they hold, reactions reach out an element.
     """
 
     def __init__(self, parts: Parts) -> None:
@@ -183,7 +183,7 @@ class BoundarySurface:
         return found
 
     def energy(self, u: np.ndarray, forces: np.ndarray) -> float:
-        """Elastic energy [J]: half of the work of all that acts (Clapeyron), weight counted on the surface's own share."""
+        """Elastic energy [J]: half of the work of all that acts on the surface (Clapeyron), that of weight left out."""
         e = self.elements
         own = u - self._hanging(e.points).ravel()
         faces = own.reshape(-1, 3)[e.triangles].mean(axis=1)

@@ -48,7 +48,7 @@ class Touch:
         return int((self.forces[:, 0] > 0).sum())
 
     def press(self, body, push: np.ndarray, dt: float, time: float, obstacles) -> np.ndarray:
-        """Generalised forces (r,) with those of contact, that keep the skin out of the obstacles at the end of the step.
+        """Generalised forces (r,) with those of contact, which keep the skin out of the obstacles at the step's end.
 
         body: see `ModalBody`.  push: generalised forces (r,) without contact.
         """

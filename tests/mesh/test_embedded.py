@@ -74,7 +74,7 @@ def test_winding_and_nearest_points(bear):
     mesh = TetMesh.from_file("asset:bear")
     centers = mesh.points[mesh.cells].mean(axis=1)[::40]
     np.testing.assert_allclose(winding_number(centers, bear.points, bear.triangles), 1, atol=1e-9)
-    np.testing.assert_allclose(winding_number(centers + [2, 0, 0], bear.points, bear.triangles), 0, atol=1e-9)
+    np.testing.assert_allclose(winding_number(centers + np.array([2, 0, 0]), bear.points, bear.triangles), 0, atol=1e-9)
     triangle = np.array([[0.0, 0, 0], [1, 0, 0], [0, 1, 0]])
     for point, nearest in (((0.2, 0.2, 1), (0.2, 0.2, 0)), ((2, -1, 1), (1, 0, 0)), ((1, 1, 0), (0.5, 0.5, 0))):
         np.testing.assert_allclose(closest_point(np.array(point), triangle), nearest, atol=1e-12)

@@ -135,5 +135,5 @@ def test_inner_points_of_a_stretched_cube(unit_cube):
 
 def test_an_open_surface_is_refused():
     points, triangles = cube(2)
-    with pytest.raises(InputError, match='not closed.*model = "condensed"'):
+    with pytest.raises(InputError, match=r'not closed.*model = "condensed"'):
         BoundaryElements(points, triangles[:-1], **STEEL)

@@ -49,7 +49,7 @@ def whole_solution(bar, held, target):
 @pytest.mark.parametrize("seed", [0, 1])
 def test_balance_is_that_of_the_whole_body(bar, condensed, compliance, seed):
     """Surface and inner nodes to 1e-10, whatever is held: one matrix for all."""
-    _, _, points, skin, forces = bar
+    _, _, _, skin, forces = bar
     rng = np.random.default_rng(seed)
     held = rng.choice(skin, size=len(skin) // 10, replace=False)
     target = 1e-4 * rng.normal(size=3 * len(held))

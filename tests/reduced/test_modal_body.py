@@ -30,7 +30,7 @@ def test_free_fall_and_spin():
     centre = simulation.masses @ simulation.positions / simulation.masses.sum()
     simulation.advance(seconds=1.0)
     after = simulation.stats
-    expected = centre + [1, 0, 2 - 0.5 * 9.81]
+    expected = centre + np.array([1, 0, 2 - 0.5 * 9.81])
     np.testing.assert_allclose(simulation.masses @ simulation.positions / simulation.masses.sum(), expected, rtol=1e-12)
     assert after.energy["total"] == pytest.approx(before.energy["total"], rel=1e-4)
     spun = simulation.bodies[0].frame.momentum
@@ -70,7 +70,7 @@ def test_swings_like_the_full_body():
 @pytest.mark.parametrize("spin", [(0, 0, 0), (2, 5, 1)])
 @pytest.mark.parametrize("friction", [0.0, 0.6])
 def test_contact_never_creates_energy(spin, friction):
-    """Undamped bodies thrown on the ground and against a ball: what they lose is what contact took, never less than 0."""
+    """Undamped bodies thrown on the ground and against a ball: what they lose is what contact took, at least 0."""
     ground = [tf.PlaneCollider(friction=friction), tf.SphereCollider(center=(0.9, 0.1, 0.0), radius=0.3)]
     thrown = dict(position=(0, 0, 0.5), velocity=(1.5, 0, -1), spin=spin)
     simulation = tf.simulate(scene_of(colliders=ground, **thrown), precision="f64")
