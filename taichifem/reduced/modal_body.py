@@ -75,6 +75,9 @@ class ModalBody:
             places, lies = parts.embedded
             self._places = places - (self.frame.origin if isinstance(self.frame, FreeFrame) else 0.0)
             rows = lies.points(self.shapes.reshape(len(self.shapes), -1), parts.cells).reshape(len(places), 3, -1)
+        self._middle = 0.5 * (self._places.min(axis=0) + self._places.max(axis=0))
+        self._radius = float(np.linalg.norm(self._places - self._middle, axis=1).max())
+        self._farthest = np.linalg.norm(rows, axis=1).max(axis=0)
         real = np.float32 if precision == "f32" else np.float64
         self._rows = np.ascontiguousarray(rows.reshape(3 * len(rows), -1), dtype=real)
         self._moment = np.einsum("n,nak->ak", parts.masses, self.shapes)
@@ -213,6 +216,12 @@ class ModalBody:
         """Points of the surface (s,3) [m] now, or at the end of a trial."""
         frame, q = (self.frame, self.modes.q) if at is None else (at.frame, at.q)
         return self._at(frame, q, self._places, self._rows)
+
+    def ball(self, at: Trial) -> tuple[np.ndarray, np.ndarray, float]:
+        """Centres (3,) now and at the end of a trial, and the radius, of a ball [m] that holds the skin meanwhile."""
+        swing = max(float(np.abs(q) @ self._farthest) for q in (self.modes.q, at.q))
+        ends = (frame.rotation @ self._middle + frame.origin for frame in (self.frame, at.frame))
+        return *ends, self._radius + swing
 
     def levers(self, which: np.ndarray) -> np.ndarray:
         """How points of the skin (m,) move with the coordinates (m,3,r)."""

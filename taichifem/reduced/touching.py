@@ -56,7 +56,10 @@ class Touch:
         if not obstacles.count:
             return push
         self._table, self._obstacles = obstacles.table(time + dt, dt), obstacles
-        alone, before = body.trial(dt, push), body.skin()
+        alone = body.trial(dt, push)
+        if not obstacles.near(self._table, *body.ball(alone)):
+            return push
+        before = body.skin()
         contact, compliance, reached = np.zeros_like(push), body.compliance(dt), alone
         for _ in range(PASSES):
             after = body.skin(reached)
