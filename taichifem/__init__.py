@@ -15,8 +15,9 @@ _HOME = {
         "PlaneCollider Pressure Scene SphereCollider SphereRegion Traction View"
     ),
     "taichifem.errors": "Diverged InputError",
-    "taichifem.mesh": "TetMesh TriMesh",
+    "taichifem.mesh": "EmbeddedSurface TetMesh TriMesh",
     "taichifem.scene": "preset",
+    "taichifem.factory": "simulate",
     "taichifem.simulation": "Simulation",
 }
 _MODULE = {name: module for module, names in _HOME.items() for name in names.split()}

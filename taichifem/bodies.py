@@ -45,6 +45,8 @@ class Bodies:
         layout = lay_out(scene)
         self._whole = layout
         self._materials = list(layout.materials)
+        if any(m.reduced for m in self._materials):
+            raise InputError('the scene has reduced models: use taichifem.simulate(scene), or model = "linear"')
         self._laws = Laws(self._materials, exact=scene.integrator in EXACT)
         self._first_skin = whole_skin(scene)
         self._take(layout)

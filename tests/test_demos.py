@@ -34,4 +34,4 @@ def frames_of(simulation: tf.Simulation):
 def test_demo(name):
     scene = tf.Scene.from_file(str(DEMOS / f"{name}.toml"))
     assert scene.description
-    load_check(name)(frames_of(tf.Simulation(scene)))
+    load_check(name)(frames_of(tf.simulate(scene)))

@@ -35,6 +35,7 @@ class BenchOptions:
     stiffness: str = "1e6"
     poisson: float = 0.4
     model: str = "corotational"
+    modes: int = 20
     plasticity: str = "none"
     solver: str = SOLVERS[0]
     precision: str = "f32"
@@ -67,7 +68,12 @@ class Plan:
         self.solvers = _each(options.solver, lambda text: _known("--solver", text, SOLVERS))
         self.peers = _each(options.against, lambda text: _known("--against", text, PEERS)) if options.against else []
         self.interpreters = interpreters(options.peer_python)
-        self.material = {"model": options.model, "plasticity": options.plasticity, "poisson": options.poisson}
+        self.material = {
+            "model": options.model,
+            "modes": options.modes,
+            "plasticity": options.plasticity,
+            "poisson": options.poisson,
+        }
         self.machine = {"precision": options.precision, "arch": options.arch, "threads": options.threads}
         if options.plot is not None:
             need_plot(options.plot)

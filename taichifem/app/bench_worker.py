@@ -13,6 +13,7 @@ import time
 from dataclasses import dataclass, replace
 
 from taichifem.app.peers.common import FPS, drive, peak_mib, spread, timed_ms
+from taichifem.description.material import REDUCED
 from taichifem.errors import InputError
 
 LENGTH, SIDE = 1.0, 0.25  # [m]
@@ -24,7 +25,7 @@ class Bar:
     """What to measure: a bar of 4m x m x m cubes, 20 m^3 tetrahedra, held at x = 0 and released at rest.
 
     youngs: [Pa].  plasticity: law of a bar that yields at half of the stress which its weight gives its root; an
-    elastic twin then runs in turn with it.
+    elastic twin then runs in turn with it.  modes: of "modal". Beside reduced models the full linear one runs.
     steps: timed ones, at most; they end after `budget` seconds.  0 steps: only the start.
     """
 
@@ -32,6 +33,7 @@ class Bar:
     youngs: float = 1e6
     poisson: float = 0.4
     model: str = "corotational"
+    modes: int = 20
     plasticity: str = "none"
     solver: str = "multilevel"
     precision: str = "f32"
@@ -58,20 +60,29 @@ def measure(bar: Bar) -> dict:
     mesh = bar_mesh(bar.m)
     simulation, setup = _set_up(bar, mesh)
     figures = {"nodes": len(mesh.points), "tets": len(mesh.cells), "taichi_s": started - begin, "setup_s": setup}
-    twin = _set_up(replace(bar, plasticity="none"), mesh)[0] if bar.plasticity != "none" else None
+    twin = _twin(bar, mesh)
     figures |= _steps(simulation, mesh.points[:, 0] > LENGTH - 1e-9, bar, twin)
     return figures | {"timoshenko_m": -timoshenko(bar.youngs, bar.poisson), "peak_mib": peak_mib()}
 
 
-def _set_up(bar: Bar, mesh) -> tuple:
-    from taichifem import Body, BoxRegion, Material, Scene, Simulation
+def _twin(bar: Bar, mesh):
+    """What runs in turn with the bar: an elastic one beside a plastic, the full one beside a reduced; or nothing."""
+    if bar.model in REDUCED:
+        return _set_up(replace(bar, model="linear"), mesh)[0]
+    return _set_up(replace(bar, plasticity="none"), mesh)[0] if bar.plasticity != "none" else None
 
-    material = Material(model=bar.model, youngs=bar.youngs, poisson=bar.poisson, density=DENSITY, **_flow(bar))
+
+def _set_up(bar: Bar, mesh) -> tuple:
+    from taichifem import Body, BoxRegion, Material, Scene, simulate
+
+    flow = {"modes": bar.modes, **_flow(bar)}
+    material = Material(model=bar.model, youngs=bar.youngs, poisson=bar.poisson, density=DENSITY, **flow)
     held = BoxRegion(lower=(-1.0, -1.0, -1.0), upper=(1e-6, 1.0, 1.0))
     body = Body(mesh=mesh, material=material, pins=[held])
-    scene = Scene(bodies=[body], gravity=(0.0, 0.0, -GRAVITY), fps=FPS, solver=bar.solver)
+    integrator = "quasi-static" if bar.model == "bem" else "backward-euler"
+    scene = Scene(bodies=[body], gravity=(0.0, 0.0, -GRAVITY), fps=FPS, solver=bar.solver, integrator=integrator)
     begin = time.perf_counter()
-    simulation = Simulation(scene, precision=bar.precision, arch=bar.arch, threads=bar.threads)
+    simulation = simulate(scene, precision=bar.precision, arch=bar.arch, threads=bar.threads)
     return simulation, time.perf_counter() - begin
 
 
@@ -103,7 +114,9 @@ def _steps(simulation, tip, bar: Bar, twin) -> dict:
     if not bar.steps:
         return figures
     iterations = [report.iterations for report in reports]
-    if twin is not None:
+    if twin is not None and bar.model in REDUCED:
+        figures["full_ms"] = spread(elastic[1:])
+    elif twin is not None:
         # The first step of the twin compiles, and is no sooner than the first timed one of the bar.
         flowed = simulation.equivalent_plastic_strain()
         figures |= {"elastic_ms": spread(elastic[1:]), "yielded": float((flowed > 0).mean())}
@@ -117,8 +130,10 @@ def _steps(simulation, tip, bar: Bar, twin) -> dict:
     }
 
 
-def _product(simulation) -> dict:
-    """The matrix product alone, against a plain read of the same memory."""
+def _product(simulation) -> dict | None:
+    """The matrix product alone, against a plain read of the same memory; None for models without one."""
+    if not hasattr(simulation, "product_bandwidth"):
+        return None
     found = simulation.product_bandwidth()
     return {"ms": 1e3 * found.product, "gb_s": found.achieved, "read_gb_s": found.limit}
 

@@ -15,6 +15,7 @@ from taichifem.app.options import (
     compare_options,
     live_options,
     machine_options,
+    modes_options,
     run_options,
     static_options,
 )
@@ -147,6 +148,25 @@ def static(ctx: click.Context, scene: str, **options: Any) -> None:
 
 @cli.command()
 @click.argument("scene")
+@modes_options
+def modes(scene: str, **options: Any) -> None:
+    """Show how the bodies of a scene vibrate.
+
+    SCENE is a scene file or the name of a demo. Prints the lowest frequencies of each body as its pins hold it, without
+    the rigid motions of a free one, for small displacements; writes a picture and a looping video of each mode.
+
+    \b
+    Examples:
+      taichifem modes scene.toml --modes 6
+      taichifem modes twist --modes 10 --no-video --no-picture --json modes.json
+    """
+    from taichifem.app.modes import ModesOptions, show_modes
+
+    show_modes(scene, ModesOptions(**options))
+
+
+@cli.command()
+@click.argument("scene")
 @compare_options
 @click.pass_context
 def compare(ctx: click.Context, scene: str, **options: Any) -> None:
@@ -174,8 +194,9 @@ def compare(ctx: click.Context, scene: str, **options: Any) -> None:
 @click.argument("source", metavar="IN")
 @click.option("-o", "--output", type=FILE, metavar="OUT", help="Where to write: .vtu, .vtk, .msh, .mesh, .inp ...")
 @click.option("--tets", type=click.IntRange(min=10), metavar="N", help="About how many tetrahedra fill a surface.")
+@click.option("--cage", type=click.IntRange(min=5), metavar="N", help="About how many tetrahedra enclose a surface.")
 @click.option("--planar", is_flag=True, help="Take IN for a flat mesh of triangles, for two-dimensional scenes.")
-def mesh(source: str, output: Path | None, tets: int | None, planar: bool) -> None:
+def mesh(source: str, output: Path | None, tets: int | None, cage: int | None, planar: bool) -> None:
     """Check, convert or make a mesh of tetrahedra, or of triangles in the plane.
 
     Prints how good the mesh IN is, and writes it to OUT if that is given.
@@ -188,13 +209,14 @@ def mesh(source: str, output: Path | None, tets: int | None, planar: bool) -> No
     Examples:
       taichifem mesh duck.ele
       taichifem mesh spot.obj --tets 5000 -o spot.vtu
+      taichifem mesh spot.obj --cage 500 -o cage.vtu        any surface: what embed = "spot.obj" rides in
       taichifem mesh sheet.msh --planar -o sheet.vtu
     """
     from taichifem.mesh import TetMesh, TriMesh, report
 
-    if planar and tets is not None:
-        raise click.UsageError("--tets fills a surface with tetrahedra: leave it out with --planar")
-    body = TriMesh.from_file(source) if planar else TetMesh.from_file(source, tets=tets)
+    if planar and (tets is not None or cage is not None):
+        raise click.UsageError("--tets and --cage make tetrahedra: leave them out with --planar")
+    body = TriMesh.from_file(source) if planar else TetMesh.from_file(source, tets=tets, cage=cage)
     click.echo(report(body))
     if output is not None:
         body.write(output)
@@ -214,6 +236,7 @@ def info() -> None:
 @click.option("--stiffness", default="1e6", show_default=True, help="Young's moduli [Pa], separated by commas.")
 @click.option("--poisson", type=float, default=0.4, show_default=True, help="Poisson's ratio.")
 @click.option("--model", type=click.Choice(MODELS), default="corotational", show_default=True, help="Of the material.")
+@click.option("--modes", type=click.IntRange(min=1), default=20, show_default=True, help="Of --model modal.")
 @click.option(
     "--plasticity",
     type=click.Choice(PLASTICITIES),
@@ -255,6 +278,7 @@ def bench(**options: Any) -> None:
       taichifem bench --sizes 1k,5k --no-cold
       taichifem bench --stiffness 1e5,1e6,1e7 --json bench.json
       taichifem bench --sizes 20k --plasticity von-mises
+      taichifem bench --sizes 1k,20k,100k --model modal --modes 50
       taichifem bench --sizes 1k,5k,20k,100k,1m --plot bench.png     needs: pip install "taichifem[plot]"
       taichifem bench --sizes 5k --against mujoco,newton --peer-python newton=~/newton/bin/python
     """

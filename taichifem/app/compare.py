@@ -74,12 +74,12 @@ def run_compare(scene: str, options: CompareOptions) -> Comparison:
     scenes = [read_scene(file, overrides, choice=f"{key}={value}") for value in values]
     grid = None if options.video is None else Grid.of(len(values), options.size)
     start_taichi(options.arch, options.threads)
-    from taichifem.simulation import Simulation
+    from taichifem.factory import simulate
 
     runs = []
     for value, one in zip(values, scenes, strict=True):
         try:
-            runs.append(Run(f"{key} = {value}", Simulation(one, precision=options.precision)))
+            runs.append(Run(f"{key} = {value}", simulate(one, precision=options.precision)))
         except InputError as error:
             raise InputError(f"--vary {key}={value}: {error}") from None
     if options.json_file is not None:

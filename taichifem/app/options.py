@@ -12,7 +12,8 @@ import click
 # The packages that own these lists take a second to import; a test compares.
 ARCHES = ("cpu", "cuda", "vulkan", "metal")
 PRECISIONS = ("f32", "f64")
-MODELS = ("mass-spring", "linear", "corotational", "stvk", "neo-hookean", "invertible")
+MODELS = ("mass-spring", "linear", "corotational", "stvk", "neo-hookean", "invertible", "modal", "condensed", "bem")
+BASES = ("fem", "quadratic")
 PLASTICITIES = ("none", "creep", "von-mises", "tresca")
 RENDERERS = ("auto", "taichi", "ggui", "pyvista")
 COLORS = ("material", "piece", "von-mises", "plastic-strain", "displacement", "speed")
@@ -162,4 +163,28 @@ static_options = together(
     click.option("--json", "json_file", type=FILE, metavar="FILE", help="Write all figures to this file, too."),
     machine_options("f64"),
     quiet_option,
+)
+
+modes_options = together(
+    set_option,
+    click.option(
+        "--modes", "count", type=click.IntRange(min=1), metavar="N", help="Of each body.  [default: the scene's]"
+    ),
+    click.option("--basis", type=click.Choice(BASES), help="What they are made of.  [default: the scene's]"),
+    click.option(
+        "-o",
+        "--output",
+        type=click.Path(file_okay=False, path_type=Path),
+        metavar="DIR",
+        help="Pictures and videos.  [default: out/NAME-modes]",
+    ),
+    click.option("--no-picture", is_flag=True, help="Draw no pictures."),
+    click.option("--no-video", is_flag=True, help="Make no videos."),
+    click.option(
+        "--size", type=Size(), metavar="WxH", default="640x480", show_default=True, help="Of the picture [pixels]."
+    ),
+    renderer_option,
+    click.option("--json", "json_file", type=FILE, metavar="FILE", help="Write all figures to this file, too."),
+    click.option("--arch", type=click.Choice(ARCHES), help="What to compute on.  [default: cpu]"),
+    click.option("--threads", type=click.IntRange(min=1), metavar="N", help="CPU threads.  [default: all cores]"),
 )

@@ -106,9 +106,9 @@ def _begin(scene: Scene, options: RunOptions) -> Simulation:
         from taichifem.live.stage import Stage
 
         return Replay(Stage(scene, precision=options.precision), interactions)
-    from taichifem.simulation import Simulation
+    from taichifem.factory import simulate
 
-    simulation = Simulation(scene, precision=options.precision)
+    simulation = simulate(scene, precision=options.precision)
     if options.resume is not None:
         simulation.load(options.resume)
     return simulation

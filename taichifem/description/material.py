@@ -8,7 +8,11 @@ from taichifem.description import check
 from taichifem.description.fracture import Fracture
 from taichifem.errors import InputError
 
-MODELS = ("mass-spring", "linear", "corotational", "stvk", "neo-hookean", "invertible")
+REDUCED = ("modal", "condensed", "bem")
+"""Linear elasticity with fewer unknowns (`taichifem.reduced`)."""
+
+MODELS = ("mass-spring", "linear", "corotational", "stvk", "neo-hookean", "invertible", *REDUCED)
+BASES = ("fem", "quadratic")
 WRAPPED = ("corotational", "stvk", "neo-hookean")
 ROTATIONS = ("polar", "qr")
 PLASTICITIES = ("none", "creep", "von-mises", "tresca")
@@ -29,6 +33,10 @@ class Material:
     Venant-Kirchhoff; gives way in compression), "neo-hookean" (stable form of Smith et al. 2018), "invertible": the
     law that `wraps` names, continued below the stretch `threshold` so that crushed elements push back (Irving, Teran
     & Fedkiw 2004), or "mass-spring": springs along the edges of the elements, which hold lengths but no volume.
+    Reduced models are linear and know the surface only: "modal" (the lowest vibration modes, in a frame that moves
+    with the body), "condensed" (inner nodes eliminated), "bem" (boundary elements, homogeneous, without inertia).
+    modes: how many elastic ones "modal" keeps.  basis: what they are made of, "fem" (the modes of the mesh) or
+    "quadratic" (affine and quadratic displacement fields: Rayleigh-Ritz; at most 24).
     rotation: of corotational elements, "polar" (the nearest to the deformation) or "qr" (that of an edge and a face:
     quicker, but the force has no energy and depends on the numbering).
     spring_stiffness: of every spring [N/m]; None derives it from `youngs` (Van Gelder 1998), whatever `poisson` is.
@@ -56,6 +64,8 @@ class Material:
     stiffness_damping: float = 0.0
     wraps: str = "stvk"
     threshold: float = 0.3
+    modes: int = 20
+    basis: str = "fem"
     rotation: str = "polar"
     spring_stiffness: float | None = None
     plasticity: str = "none"
@@ -82,7 +92,20 @@ class Material:
             check.number("spring_stiffness", self.spring_stiffness, above=0, unit="N/m")
             if self.model != "mass-spring":
                 raise InputError(f'spring_stiffness belongs to "mass-spring", and the model is {self.model!r}: drop it')
+        check.whole("modes", self.modes)
+        check.choice("basis", self.basis, BASES)
         self._check_plasticity()
+        if self.reduced and (self.plasticity != "none" or self.fracture is not None):
+            what = "plasticity" if self.plasticity != "none" else "fracture"
+            raise InputError(
+                f"{what} changes the body, and model {self.model!r} is worked out beforehand: "
+                'use model = "corotational"'
+            )
+
+    @property
+    def reduced(self) -> bool:
+        """Is it one of the models with fewer unknowns?"""
+        return self.model in REDUCED
 
     def _check_plasticity(self) -> None:
         check.choice("plasticity", self.plasticity, PLASTICITIES)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
+from functools import cached_property
 
 import numpy as np
 
@@ -15,7 +16,8 @@ from taichifem.description.motion import Motion, rotation_matrix
 from taichifem.description.regions import Region
 from taichifem.description.view import Camera, View
 from taichifem.errors import InputError
-from taichifem.mesh import Mesh
+from taichifem.mesh import EmbeddedSurface, Mesh
+from taichifem.mesh.embedded import Embedding, embed
 
 INTEGRATORS = ("backward-euler", "backward-euler-newton", "bdf2", "newmark", "symplectic-euler", "quasi-static")
 SOLVERS = ("multilevel", "block-jacobi")
@@ -73,6 +75,7 @@ class Body:
     pins: regions to hold, or Pin objects.  handles: springs that pull.  forces, tractions, pressures: loads.
     A planar mesh (triangles) lies in the plane y = 0, in plane strain; `thickness` [m] is its extent along y. It can
     be turned about y only.
+    embed: a surface that rides in the mesh, placed like it, and is drawn, exported and recorded in its place.
     """
 
     mesh: Mesh
@@ -91,8 +94,13 @@ class Body:
     tractions: Sequence[Traction] = ()
     pressures: Sequence[Pressure] = ()
     thickness: float = 1.0
+    embed: EmbeddedSurface | None = None
 
     def __post_init__(self) -> None:
+        if self.embed is not None and self.mesh.dimension == 2:
+            raise InputError("embed rides in tetrahedra, and the mesh is planar: leave it out")
+        if self.embed is not None:
+            self.embedding  # noqa: B018  (tells early where the surface reaches far out of the mesh)
         check.number("scale", self.scale, above=0)
         check.number("thickness", self.thickness, above=0, unit="m")
         if not np.linalg.norm(check.vector("axis", self.axis)) > 0:
@@ -117,11 +125,20 @@ class Body:
         if self.spin[0] or self.spin[2]:
             raise InputError(f"spin {tuple(self.spin)} turns a planar body out of its plane: only y may differ from 0")
 
+    @cached_property
+    def embedding(self) -> Embedding:
+        """Where the points of `embed` lie in the mesh."""
+        return embed(np.asarray(self.embed.points, dtype=float), self.mesh.points, self.mesh.cells)
+
     def placed_points(self) -> np.ndarray:
         """Rest positions of the nodes in the world (n,3) [m]."""
         points = self.mesh.points
         if self.mesh.dimension == 2:
             points = np.column_stack([points[:, 0], np.zeros(len(points)), points[:, 1]])
+        return self.placed(points)
+
+    def placed(self, points: np.ndarray) -> np.ndarray:
+        """Points (n,3) of the mesh's own coordinates in the world [m]."""
         turned = self.scale * points @ rotation_matrix(self.axis, self.angle).T
         return turned + np.asarray(self.position, dtype=float)
 

@@ -4,6 +4,7 @@ NumPy only: nothing here starts Taichi.
 """
 
 from taichifem.mesh.assets import asset_names, asset_path
+from taichifem.mesh.embedded import EmbeddedSurface
 from taichifem.mesh.kinds import Mesh, mesh_from_source
 from taichifem.mesh.quality import Quality, quality
 from taichifem.mesh.report import report
@@ -13,6 +14,7 @@ from taichifem.mesh.tri_quality import TriQuality
 from taichifem.mesh.validation import Repairs
 
 __all__ = [
+    "EmbeddedSurface",
     "Mesh",
     "Quality",
     "Repairs",

@@ -34,10 +34,11 @@ class Solid:
 
 @dataclass(frozen=True)
 class Surface:
-    """What a surface file holds: points (n, 3), triangles (k, 3)."""
+    """What a surface file holds: points (n, 3), triangles (k, 3), colours of the points (n, 3) in [0, 1] or None."""
 
     points: np.ndarray
     triangles: np.ndarray
+    colors: np.ndarray | None = None
 
 
 def read(path: str | PathLike, surface_wanted: bool = False) -> Solid | Surface:
@@ -152,4 +153,7 @@ def _read_surface(path: Path) -> Surface:
     triangles = getattr(mesh, "faces", None)
     if triangles is None or len(triangles) == 0:
         raise InputError("holds no triangles; export a closed surface")
-    return Surface(np.asarray(mesh.vertices, float), np.asarray(triangles))
+    colors = None
+    if getattr(mesh.visual, "kind", None) == "vertex":
+        colors = np.asarray(mesh.visual.vertex_colors, float)[:, :3] / 255
+    return Surface(np.asarray(mesh.vertices, float), np.asarray(triangles), colors)

@@ -10,7 +10,9 @@ import numpy as np
 
 from taichifem.errors import InputError
 from taichifem.mesh import implicit, reading, shapes, tetrahedralize, writing
+from taichifem.mesh.cage import cage as enclose
 from taichifem.mesh.connectivity import boundary_faces
+from taichifem.mesh.embedded import EmbeddedSurface
 from taichifem.mesh.simplex_mesh import SimplexMesh, check_file_source
 from taichifem.mesh.validation import signed_sizes
 
@@ -68,17 +70,22 @@ class TetMesh(SimplexMesh):
         writing.write(path, self.points, self.cells, self.regions)
 
     @classmethod
-    def from_file(cls, path: str | PathLike, tets: int | None = None) -> TetMesh:
-        """Read a volume mesh, or read a closed surface and fill it with tetrahedra.
+    def from_file(cls, path: str | PathLike, tets: int | None = None, cage: int | None = None) -> TetMesh:
+        """Read a volume mesh, or read a closed surface and fill it with tetrahedra, or any surface and enclose it.
 
         Args:
             path: a volume mesh (`.msh .vtk .vtu .mesh .inp .node .ele .veg` and all else that meshio reads),
                 a closed surface (`.stl .obj .ply .off .glb .gltf`), or `asset:NAME`.
             tets: about how many tetrahedra to fill a surface with; None leaves it to the tetrahedraliser.
+            cage: make a coarse mesh of about as many tetrahedra around the surface instead, for it to be embedded in.
 
         Raises:
             InputError: there is no such file, it cannot be read, or it does not hold what is needed.
         """
+        if cage is not None:
+            if tets is not None:
+                raise InputError(f"{path}: tets fills a surface and cage encloses it: give one of them")
+            return cls(*enclose(EmbeddedSurface.from_file(path), cage), source={"file": str(path), "cage": cage})
         content = reading.read(path, surface_wanted=tets is not None)
         source = {"file": str(path)} | ({} if tets is None else {"tets": tets})
         try:
@@ -140,6 +147,6 @@ class TetMesh(SimplexMesh):
         return cls._shape("torus", major_radius=major_radius, minor_radius=minor_radius, resolution=resolution)
 
     @classmethod
-    def _file(cls, file: str | None = None, tets: int | None = None, **unknown) -> TetMesh:
+    def _file(cls, file: str | None = None, tets: int | None = None, cage: int | None = None, **unknown) -> TetMesh:
         check_file_source(file, unknown)
-        return cls.from_file(file, tets)
+        return cls.from_file(file, tets, cage)

@@ -14,6 +14,7 @@ import numpy as np
 from taichifem.description import check
 from taichifem.errors import InputError
 from taichifem.files import replacing
+from taichifem.output.skin import Skin
 
 
 def open_export(directory: str | os.PathLike, format: str, simulation: Any) -> MeshSequence:
@@ -99,9 +100,10 @@ def write_vtu(path: Path, simulation: Any, **point_data: np.ndarray) -> None:
 
 
 def _surface(simulation: Any) -> meshio.Mesh:
-    """The surface with only the nodes on it, in the 32 bits that viewers of these formats read."""
-    nodes, triangles = np.unique(simulation.surface, return_inverse=True)
-    points = simulation.positions[nodes].astype(np.float32)
+    """The surface that is seen, with only its own points, in the 32 bits that viewers of these formats read."""
+    seen = Skin().of(simulation)
+    nodes, triangles = np.unique(seen.triangles, return_inverse=True)
+    points = seen.follow(simulation.positions, simulation.cells)[nodes].astype(np.float32)
     return meshio.Mesh(points, [("triangle", triangles.reshape(-1, 3).astype(np.int32))])
 
 

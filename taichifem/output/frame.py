@@ -13,6 +13,7 @@ from taichifem.description.colliders import BoxCollider, Collider, PlaneCollider
 from taichifem.description.motion import rotation_matrix
 from taichifem.description.view import View
 from taichifem.output import colors
+from taichifem.output.skin import Seen, Skin
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -121,13 +122,14 @@ def _unit_sphere(rings: int = 24, sectors: int = 48) -> tuple[np.ndarray, np.nda
     return points, np.vstack(faces).astype(np.int32)
 
 
-def _surface_colors(simulation: Any, view: View) -> np.ndarray:
-    """Colours (k,3) of the triangles: of their bodies or pieces, and what cracks opened paler."""
+def _surface_colors(seen: Seen, simulation: Any, view: View) -> np.ndarray:
+    """Colours (k,3) of the triangles: their own, those of their bodies or pieces, and what cracks opened paler."""
     if view.color == "piece":
-        return colors.body_colors(simulation.piece_count, view.colors)[simulation.surface_pieces]
-    found = colors.body_colors(len(simulation.scene.bodies), view.colors)[np.asarray(simulation.surface_bodies)]
-    cracked = np.asarray(simulation.crack_faces)
-    found[cracked] = 0.35 * found[cracked] + 0.65 * colors.CRACK
+        return colors.body_colors(simulation.piece_count, view.colors)[seen.pieces]
+    found = colors.body_colors(len(simulation.scene.bodies), view.colors)[seen.bodies]
+    own = np.isfinite(seen.colors).all(axis=1)
+    found[own] = seen.colors[own]
+    found[seen.cracked] = 0.35 * found[seen.cracked] + 0.65 * colors.CRACK
     return found
 
 
@@ -138,15 +140,19 @@ class FrameBuilder:
         self._top = 0.0
         self._cells = np.zeros((0, 4), int)
         self._around = np.ones(0)
+        self.skin = Skin()
 
     def build(self, simulation: Any) -> Frame:
         """The frame of `simulation` now."""
         view = simulation.scene.view
         values, label, unit = self._values(simulation, view.color)
+        seen, cells = self.skin.of(simulation), np.asarray(simulation.cells)
+        if values is not None:
+            values = seen.follow(values, cells).astype(np.float32)
         return Frame(
-            points=np.ascontiguousarray(simulation.positions, np.float32),
-            triangles=np.ascontiguousarray(simulation.surface, np.int32),
-            colors=_surface_colors(simulation, view),
+            points=np.ascontiguousarray(seen.follow(np.asarray(simulation.positions), cells), np.float32),
+            triangles=np.ascontiguousarray(seen.triangles, np.int32),
+            colors=_surface_colors(seen, simulation, view),
             values=values,
             value_range=self._range(values, view.range),
             value_label=label,

@@ -11,7 +11,7 @@ from typing import Any, Union, get_args, get_origin
 
 from taichifem.description import Collider, Material, Pin, Region, Scene
 from taichifem.errors import InputError
-from taichifem.mesh import Mesh, TetMesh, mesh_from_source
+from taichifem.mesh import EmbeddedSurface, Mesh, TetMesh, mesh_from_source
 from taichifem.mesh.kinds import SHAPES, kind_of
 from taichifem.scene import plain, presets
 from taichifem.scene.errors import KeyProblem, at, join, unknown_key, wrong
@@ -62,6 +62,7 @@ class _Builder:
         """`raw` as the type `hint` wants it."""
         origin, args = get_origin(hint), get_args(hint)
         special = {Material: self.material, TetMesh: self.mesh, Mesh: self.mesh, Collider: self.collider}
+        special[EmbeddedSurface] = self.embedded
         if hint in special:
             return special[hint](raw, path)
         if hint in plain.READERS:
@@ -113,6 +114,20 @@ class _Builder:
             raise KeyProblem(where, f"{where}: {error}") from None
         return self.table(Material, raw, path, **{name: getattr(base, name) for name in hints(Material)})
 
+    def file(self, raw: object, path: str) -> str:
+        """A file by its name as seen from the scene file, or `asset:NAME`."""
+        name = plain.text(raw, path)
+        return name if name.startswith("asset:") else str(self.folder / name)
+
+    def embedded(self, raw: object, path: str) -> EmbeddedSurface:
+        """A surface by its file."""
+        try:
+            return EmbeddedSurface.from_file(self.file(raw, path))
+        except KeyProblem:
+            raise
+        except InputError as error:
+            raise KeyProblem(path, f"{path}: {error}") from None
+
     def mesh(self, raw: object, path: str) -> Mesh:
         """A shape with its parameters, or a file, which may be planar. The mesh itself checks the values."""
         raw = dict(plain.table(raw, path))
@@ -123,10 +138,10 @@ class _Builder:
         else:
             plain.flag(raw.get("planar", False), join(path, "planar"))
             first, maker = ["file", "planar"], kind_of(raw).from_file
-            name = plain.text(raw["file"], join(path, "file"))
-            raw["file"] = name if name.startswith("asset:") else str(self.folder / name)
-            if plain.whole(raw.get("tets", 1), join(path, "tets")) < 1:
-                raise wrong(join(path, "tets"), "at least 1", raw["tets"])
+            raw["file"] = self.file(raw["file"], join(path, "file"))
+            for count in ("tets", "cage"):
+                if plain.whole(raw.get(count, 1), join(path, count)) < 1:
+                    raise wrong(join(path, count), "at least 1", raw[count])
         known = [*first, *(name for name in inspect.signature(maker).parameters if name != "path")]
         for key in raw:
             if key not in known:

@@ -12,6 +12,7 @@ from functools import cache
 from typing import get_args, get_type_hints
 
 from taichifem.description import Collider, Region, Scene
+from taichifem.mesh import EmbeddedSurface
 
 SIMULATION = "simulation"
 _ABOUT = (
@@ -56,7 +57,9 @@ def _is_table_list(hint: object) -> bool:
 
 def holds_dataclass(hint: object) -> bool:
     """Whether values of the type `hint` are, or contain, dataclasses."""
-    return hasattr(hint, "__dataclass_fields__") or any(map(holds_dataclass, get_args(hint)))
+    return (hasattr(hint, "__dataclass_fields__") and hint is not EmbeddedSurface) or any(
+        map(holds_dataclass, get_args(hint))
+    )
 
 
 def _singular(name: str) -> str:

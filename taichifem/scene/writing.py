@@ -12,8 +12,9 @@ import numpy as np
 import tomli_w
 
 from taichifem.description import Pin, Scene
+from taichifem.errors import InputError
 from taichifem.files import replacing
-from taichifem.mesh import Mesh
+from taichifem.mesh import EmbeddedSurface, Mesh
 from taichifem.scene.layout import COLLIDERS, REGIONS, SIMULATION, keys
 
 _REGION_KEYS = {cls: key for key, cls in REGIONS.items()}
@@ -71,6 +72,12 @@ class _Writer:
         """`value` as TOML knows it."""
         if type(value) in _REGION_KEYS:
             return self.table(Pin(region=value))
+        if isinstance(value, EmbeddedSurface):
+            if value.file is None:
+                raise InputError(
+                    "an embedded surface without a file cannot be written: make it by EmbeddedSurface.from_file"
+                )
+            return self.file(value.file)
         if type(value) in _COLLIDER_TYPES:
             return {"type": _COLLIDER_TYPES[type(value)], **self.table(value)}
         if dataclasses.is_dataclass(value):

@@ -20,6 +20,7 @@ class StubSimulation:
         self.rest_positions, self.cells = mesh.points, mesh.cells
         self.surface = mesh.surface()
         self.crack_faces = np.zeros(len(self.surface), dtype=bool)
+        self.surface_bodies = np.zeros(len(self.surface), dtype=int)
         self.cell_bodies = np.zeros(len(self.cells), int)
         self.cell_regions = np.arange(len(self.cells)) % 2
         self.frame, self.diverges_at, self.interrupted_at = 0, diverges_at, interrupted_at

@@ -57,7 +57,7 @@ def test_a_choice_comes_after_the_overrides_and_knows_what_they_made(everything)
 @pytest.mark.parametrize(
     ("choice", "fragments"),
     [
-        ("modle=stvk", ["choice 'modle=stvk'", "unknown key 'modle'", "did you mean 'model'?"]),
+        ("moddel=stvk", ["choice 'moddel=stvk'", "unknown key 'moddel'", "did you mean 'model'?"]),
         ("gravty=3", ["did you mean 'gravity'?"]),
         ("name=x", ["unknown key 'name'"]),
         ("model=stvkk", ["body.0.material.model is 'stvkk'", "choose one of", "set by the override 'model=stvkk'"]),

@@ -1,0 +1,158 @@
+"""What of the bodies is seen: their surface, or the one that is embedded in them. It follows cracks."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from taichifem.mesh.connectivity import boundary_faces
+from taichifem.mesh.embedded import Embedding, barycentric, closest_point, embed, winding_number
+
+
+@dataclass(frozen=True)
+class Seen:
+    """Triangles (k,3) of nodes, which come first, and of points that ride in elements.
+
+    riders: where those points lie.  bodies, pieces, cracked: of each triangle (k,).  colors (k,3) sRGB of its own, NaN
+    where the surface has none.
+    """
+
+    triangles: np.ndarray
+    riders: Embedding
+    bodies: np.ndarray
+    pieces: np.ndarray
+    cracked: np.ndarray
+    colors: np.ndarray
+
+    def follow(self, values: np.ndarray, cells: np.ndarray) -> np.ndarray:
+        """Values of all points, from those of the nodes (n,) or (n,3)."""
+        if not len(self.riders.element):
+            return values
+        columns = values.reshape(len(values), -1)
+        return np.concatenate([columns, self.riders.points(columns, cells)]).reshape(-1, *values.shape[1:])
+
+
+class Skin:
+    """The seen surface of one simulation; worked out again when its mesh changes."""
+
+    def __init__(self) -> None:
+        self._cells: np.ndarray | None = None
+        self._riding: list[_Rider] | None = None
+
+    def of(self, simulation: Any) -> Seen:
+        """What is seen of `simulation` now."""
+        cells = np.asarray(simulation.cells)
+        if self._riding is None:
+            self._riding = _riders(simulation)
+        if not self._riding:
+            return _plain(simulation)
+        if self._cells is None or not np.array_equal(cells, self._cells):
+            self._cells, self._seen = cells.copy(), self._work_out(simulation, cells)
+        return self._seen
+
+    def _work_out(self, simulation: Any, cells: np.ndarray) -> Seen:
+        surface, bodies = np.asarray(simulation.surface), np.asarray(simulation.surface_bodies)
+        shown = ~np.isin(bodies, [rider.body for rider in self._riding])
+        cracked = np.asarray(simulation.crack_faces)
+        parts = [(surface[shown], bodies[shown], np.asarray(simulation.surface_pieces)[shown], cracked[shown])]
+        colors, elements, weights = [np.full((shown.sum(), 3), np.nan)], [], []
+        first = len(simulation.rest_positions)
+        for rider in self._riding:
+            triangles, element, weight = rider.corners(cells, np.asarray(simulation.cell_pieces))
+            pieces = np.asarray(simulation.cell_pieces)[rider.home]
+            parts.append(
+                (triangles + first, np.full(len(triangles), rider.body), pieces, np.zeros(len(triangles), bool))
+            )
+            colors.append(rider.colors)
+            elements.append(element), weights.append(weight)
+            first += len(element)
+            opened = cracked & (bodies == rider.body)
+            if opened.any():
+                triangles, element, weight = rider.crack(surface[opened], cells)
+                pieces = np.asarray(simulation.surface_pieces)[opened]
+                parts.append((triangles + first, bodies[opened], pieces, np.ones(len(triangles), bool)))
+                colors.append(np.full((len(triangles), 3), np.nan))
+                elements.append(element), weights.append(weight)
+                first += len(element)
+        riders = Embedding(np.concatenate(elements), np.concatenate(weights))
+        columns = (np.concatenate(column) for column in zip(*parts, strict=True))
+        triangles, bodies, pieces, cracked = columns
+        return Seen(triangles.astype(np.int32), riders, bodies, pieces, cracked, np.concatenate(colors))
+
+
+def _plain(simulation: Any) -> Seen:
+    nobody = Embedding(np.zeros(0, dtype=int), np.zeros((0, 4)))
+    triangles = np.asarray(simulation.surface)
+    colors = np.full((len(triangles), 3), np.nan)
+    asked = simulation.scene.view.color == "piece"
+    pieces = simulation.surface_pieces if asked else np.zeros(len(triangles), dtype=int)
+    return Seen(
+        triangles, nobody, np.asarray(simulation.surface_bodies), pieces, np.asarray(simulation.crack_faces), colors
+    )
+
+
+def _riders(simulation: Any) -> list[_Rider]:
+    """The embedded surfaces of the scene; the mesh of the simulation may have broken already."""
+    found = []
+    for b, body in enumerate(simulation.scene.bodies):
+        if getattr(body, "embed", None) is not None:
+            own = np.flatnonzero(np.asarray(simulation.cell_bodies) == b)
+            found.append(_Rider(b, body, own))
+    return found
+
+
+class _Rider:
+    """An embedded surface in its mesh at rest. home: the element (k,) that each triangle goes with."""
+
+    def __init__(self, number: int, body: Any, cells: np.ndarray) -> None:
+        self.body, self._of = number, cells
+        self._nodes, self._whole = body.placed_points(), np.asarray(body.mesh.cells)
+        self.points, self.triangles = body.placed(np.asarray(body.embed.points)), np.asarray(body.embed.triangles)
+        self._own, self._weights = body.embedding.element, body.embedding.weights
+        self._home = embed(self.points[self.triangles].mean(axis=1), self._nodes, self._whole).element
+        self.home = cells[self._home]
+        shades = body.embed.colors
+        self.colors = (
+            np.full((len(self.triangles), 3), np.nan) if shades is None else shades[self.triangles].mean(axis=1)
+        )
+
+    def _in(self, points: np.ndarray, element: np.ndarray) -> np.ndarray:
+        corners = self._nodes[self._whole[element]]
+        edges = (corners[:, 1:] - corners[:, :1]).transpose(0, 2, 1)
+        return barycentric(points, corners[:, 0], np.linalg.inv(edges))
+
+    def corners(self, cells: np.ndarray, pieces: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+        """Triangles (k,3) of riding points, and those points' elements and weights.
+
+        A corner that a crack has parted from its triangle goes with the triangle.
+        """
+        k = len(self.triangles)
+        own, home = self._own[self.triangles], np.repeat(self._home[:, None], 3, axis=1)
+        now, before = cells[self._of], self._whole
+        touched = (before[own][..., :, None] == before[home][..., None, :]).any(axis=(2, 3))
+        touches = (now[own][..., :, None] == now[home][..., None, :]).any(axis=(2, 3))
+        parted = np.where(touched, ~touches, pieces[self._of[own]] != pieces[self._of[home]])
+        lost = np.flatnonzero(parted.ravel())
+        triangles = self.triangles.copy().ravel()
+        vertices, carriers = triangles[lost], home.ravel()[lost]
+        triangles[lost] = len(self.points) + np.arange(len(lost))
+        element = np.concatenate([self._own, carriers])
+        weights = np.concatenate([self._weights, self._in(self.points[vertices], carriers)])
+        return triangles.reshape(k, 3), self._of[element], weights
+
+    def crack(self, faces: np.ndarray, cells: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+        """Faces (f,3) that cracks opened, drawn in where they would stick out of the surface."""
+        boundary, owner = boundary_faces(cells[self._of])
+        place = {frozenset(face): e for face, e in zip(boundary.tolist(), owner.tolist(), strict=True)}
+        element = np.repeat([place[frozenset(face)] for face in faces.tolist()], 3)
+        corner = (cells[self._of][element] == faces.reshape(-1, 1)).argmax(axis=1)
+        at = self._nodes[self._whole[element, corner]]
+        outside = winding_number(at, self.points, self.triangles) < 0.5
+        moved, corners = at.copy(), self.points[self.triangles]
+        for i in np.flatnonzero(outside):
+            nearest = closest_point(at[i], corners)
+            moved[i] = nearest[((nearest - at[i]) ** 2).sum(axis=1).argmin()]
+        weights = self._in(moved, element)
+        return np.arange(3 * len(faces)).reshape(-1, 3), self._of[element], weights

@@ -1,0 +1,81 @@
+"""How far points end up inside colliders, and which way out is."""
+
+import numpy as np
+
+from taichifem import runtime
+from taichifem.description import Scene
+from taichifem.formulas import collision
+from taichifem.runtime import ti
+from taichifem.surroundings import collider_table
+
+_array = ti.types.ndarray
+
+
+@ti.kernel
+def _gaps(table: _array(), before: _array(), after: _array(), gaps: _array(), normals: _array()):
+    for i, c in ti.ndrange(before.shape[0], table.shape[0]):
+        start, end = ti.Vector.zero(ti.f64, 3), ti.Vector.zero(ti.f64, 3)
+        size, normal = ti.Vector.zero(ti.f64, 3), ti.Vector.zero(ti.f64, 3)
+        R0, R1 = ti.Matrix.zero(ti.f64, 3, 3), ti.Matrix.zero(ti.f64, 3, 3)
+        for a in ti.static(range(3)):
+            start[a] = before[i, a] - table[c, 14 + a]
+            end[a] = after[i, a] - table[c, 5 + a]
+            size[a] = table[c, 2 + a]
+            for b in ti.static(range(3)):
+                R1[a, b] = table[c, 17 + 3 * a + b]
+                R0[a, b] = table[c, 26 + 3 * a + b]
+        p0, p1 = R0.transpose() @ start, R1.transpose() @ end
+        kind = ti.cast(table[c, 0], ti.i32)
+        gap, local = collision.gap_to_half_space(p1)
+        normal = ti.cast(local, ti.f64)
+        if kind == collision.SPHERE:
+            gap, normal = collision.gap_to_sphere(p0, p1, size[0])
+        elif kind == collision.BOX:
+            gap, normal = collision.gap_to_box(p0, p1, 0.5 * size)
+        outward = R1 @ normal
+        gaps[i, c] = gap
+        for a in ti.static(range(3)):
+            normals[i, c, a] = outward[a]
+
+
+class Obstacles:
+    """The colliders of a scene over time."""
+
+    def __init__(self, scene: Scene) -> None:
+        self.count = len(scene.colliders)
+        self._scene = scene
+        self.friction = np.array([collider.friction for collider in scene.colliders])
+
+    def table(self, time: float, dt: float) -> np.ndarray:
+        """Where they stand at `time` [s], the end of a step of dt [s] (`surroundings.collider_table`)."""
+        return collider_table(self._scene.colliders, time, dt)
+
+    def near(self, table: np.ndarray, before: np.ndarray, after: np.ndarray, radius: float) -> bool:
+        """May a ball that goes from `before` to `after` (3,) meet a collider on its way? Errs to yes."""
+        way = np.linalg.norm(after - before)
+        for row in table:
+            kind, own = row[0], row[5:8] - row[14:17]
+            if kind == collision.PLANE:
+                normal = row[17:26].reshape(3, 3)[:, 2]
+                clear = min((after - row[5:8]) @ normal, (before - row[5:8]) @ normal)
+            else:
+                size = row[2] if kind == collision.SPHERE else 0.5 * np.linalg.norm(row[2:5])
+                clear = np.linalg.norm(after - row[5:8]) - size - way
+            if clear < radius + np.linalg.norm(own):
+                return True
+        return False
+
+    def gaps(self, table: np.ndarray, before: np.ndarray, after: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """Gaps (n,colliders) [m] of points that go from `before` to `after` (n,3), negative inside, and the outward
+        normals (n,colliders,3)."""
+        gaps, normals = np.zeros((len(after), self.count)), np.zeros((len(after), self.count, 3))
+        if self.count and len(after):
+            ends = (np.ascontiguousarray(points, dtype=np.float64) for points in (before, after))
+            with runtime.precision_of("f64"):
+                _gaps(np.ascontiguousarray(table), *ends, gaps, normals)
+        return gaps, normals
+
+    def carried(self, table: np.ndarray, which: np.ndarray, points: np.ndarray, dt: float) -> np.ndarray:
+        """How far (n,3) [m] the colliders `which` (n,) take points (n,3) along that stick to them, over dt [s]."""
+        rows = table[which]
+        return dt * (rows[:, 8:11] + np.cross(rows[:, 11:14], points - rows[:, 5:8]))

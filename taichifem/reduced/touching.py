@@ -1,0 +1,136 @@
+"""Contact of a modal body with colliders: which points touch, and what pushes them."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from taichifem.reduced.contact import contact_forces, frames_of, stopping_impulses
+
+PASSES = 5
+MOST = 40
+"""Contacts that are added in a pass at most: a body of some dozens of coordinates needs no more."""
+
+CELLS = 6
+
+PRECISE = 1e-5
+"""Error of a gap [m] that another pass is made for."""
+
+
+def spread_out(points: np.ndarray, gaps: np.ndarray, most: int) -> np.ndarray:
+    """Of points (m,3), at most `most`: the deepest of each cell of a grid, the deepest of all first."""
+    if len(points) <= most:
+        return np.arange(len(points))
+    low, extent = points.min(axis=0), np.ptp(points, axis=0).max()
+    cells = np.minimum((points - low) / max(extent, 1e-300) * CELLS, CELLS - 1).astype(int)
+    key = cells @ (CELLS * CELLS, CELLS, 1)
+    order = np.lexsort((gaps, key))
+    first = order[np.r_[True, np.diff(key[order]) > 0]]
+    return first[np.argsort(gaps[first], kind="stable")][:most]
+
+
+class Touch:
+    """The contacts of one body in a step.
+
+    dissipated: energy [J] that contact has taken up to now, from which pushing out of a penetration is paid for.
+    """
+
+    def __init__(self) -> None:
+        self.dissipated = 0.0
+        self._clear()
+
+    def _clear(self) -> None:
+        self.points, self.which = np.zeros(0, dtype=int), np.zeros(0, dtype=int)
+        self.frames, self.forces = np.zeros((0, 3, 3)), np.zeros((0, 3))
+
+    @property
+    def count(self) -> int:
+        """Points that were pushed in the last step."""
+        return int((self.forces[:, 0] > 0).sum())
+
+    def press(self, body, push: np.ndarray, dt: float, time: float, obstacles) -> np.ndarray:
+        """Generalised forces (r,) with those of contact, which keep the skin out of the obstacles at the step's end.
+
+        body: see `ModalBody`.  push: generalised forces (r,) without contact.
+        """
+        self._clear()
+        if not obstacles.count:
+            return push
+        self._table, self._obstacles = obstacles.table(time + dt, dt), obstacles
+        alone = body.trial(dt, push)
+        if not obstacles.near(self._table, *body.ball(alone)):
+            return push
+        before = body.skin()
+        contact, compliance, reached = np.zeros_like(push), body.compliance(dt), alone
+        for _ in range(PASSES):
+            after = body.skin(reached)
+            gaps, normals = obstacles.gaps(self._table, before, after)
+            if not self._take(after, gaps, normals):
+                break
+            # How contact turns the frame is linear to first order only: correct by where it really leads.
+            contact = self._forces(body, before, after, compliance, dt, time)
+            reached = body.trial(dt, push + contact)
+        return push + self._paid(body, push, contact, reached, alone, dt)
+
+    def _take(self, after: np.ndarray, gaps: np.ndarray, normals: np.ndarray) -> bool:
+        """Add the points (n,3) that have gone in; is there anything to be done?"""
+        known = np.zeros(gaps.shape, dtype=bool)
+        known[self.points, self.which] = True
+        points, which = np.nonzero((gaps < 0) & ~known)
+        new = spread_out(after[points], gaps[points, which], MOST)
+        points, which = points[new], which[new]
+        self.points, self.which = np.r_[self.points, points], np.r_[self.which, which]
+        self.frames = np.concatenate([self.frames, frames_of(normals[points, which])])
+        self.forces = np.concatenate([self.forces, np.zeros((len(points), 3))])
+        self._gaps = gaps[self.points, self.which]
+        return len(points) > 0 or np.abs(self._gaps[self.forces[:, 0] > 0]).max(initial=0.0) > PRECISE
+
+    def _forces(self, body, before, after, compliance, dt, time) -> np.ndarray:
+        """What the contacts known so far do to the coordinates (r,)."""
+        p, at = self.points, np.arange(len(self.points))
+        slip = after[p] - before[p] - self._obstacles.carried(self._table, self.which, before[p], dt)
+        end = np.einsum("mab,mb->ma", self.frames, slip)
+        end[:, 0] = self._gaps
+        J = np.einsum("mab,mbr->mar", self.frames, body.levers(p)).reshape(3 * len(p), -1)
+        answer = J @ compliance @ J.T
+        free = end - (answer @ self.forces.ravel()).reshape(-1, 3)
+        friction = self._obstacles.friction[self.which]
+        self.forces = contact_forces(answer, free, friction, self.forces)
+        # What is inside already is pushed out if contact has taken enough energy to pay for it.
+        begin = self._obstacles.gaps(self._obstacles.table(time, dt), before[p], before[p])[0][at, self.which]
+        begin = np.minimum(begin, 0.0)
+        flat = self.forces.ravel()
+        if flat @ (answer @ flat + free.ravel()) - self.forces[:, 0] @ begin > self.dissipated:
+            self.forces = contact_forces(
+                answer, free - np.column_stack([begin, 0 * begin, 0 * begin]), friction, self.forces
+            )
+        return J.T @ self.forces.ravel()
+
+    def _paid(self, body, push, contact, reached, alone, dt) -> np.ndarray:
+        """The contact forces, or a part of them that takes no more energy than contact has dissipated."""
+        for share in (1.0, 0.95, 0.85, 0.7, 0.5, 0.25, 0.0):
+            part = share * contact
+            work = body.work(part, reached if share == 1 else body.trial(dt, push + part), alone)
+            if work <= self.dissipated:
+                break
+        self.dissipated -= work
+        self.forces = share * self.forces
+        return part
+
+    def stop(self, body, dt: float) -> None:
+        """At the end of the step, stop what the obstacles pushed: a step that just closes a gap would fling it back."""
+        held = self.forces[:, 0] > 0
+        if not held.any():
+            return
+        points, which, frames = self.points[held], self.which[held], self.frames[held]
+        places, velocity = body.velocities_of(points)
+        relative = velocity - self._obstacles.carried(self._table, which, places, dt) / dt
+        J = np.einsum("mab,mbr->mar", frames, body.levers(points)).reshape(3 * len(points), -1)
+        answer = J @ body.mobility() @ J.T
+        seen = np.einsum("mab,mb->ma", frames, relative)
+        # Friction has acted during the step: only what it has left may act now.
+        side = np.linalg.norm(self.forces[held, 1:], axis=1)
+        most = np.maximum(self._obstacles.friction[which] * self.forces[held, 0] - side, 0.0) * dt
+        impulses = stopping_impulses(answer, seen, most)
+        before = body.kinetic_energy
+        body.strike(J.T @ impulses.ravel())
+        self.dissipated += before - body.kinetic_energy

@@ -1,0 +1,85 @@
+"""What is seen of bodies with embedded surfaces: whole, moved, broken."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+import taichifem as tf
+from taichifem.output.export import open_export
+from taichifem.output.frame import FrameBuilder
+from taichifem.output.skin import Skin
+
+BEAR = tf.EmbeddedSurface.from_file("asset:bear")
+CAGE = tf.TetMesh.from_file("asset:bear", cage=300)
+BODY = tf.Body(mesh=CAGE, embed=BEAR, material=tf.Material(youngs=1e5), position=(0, 0, 1), angle=30.0)
+
+
+def test_the_frame_shows_the_surface_in_its_place():
+    simulation = tf.Simulation(tf.Scene(bodies=[BODY]), precision="f64")
+    turn = tf.Motion(angle=(70.0,), axis=(1, 2, 3)).at(0)[0]
+    simulation.set_positions(simulation.rest_positions @ turn.T + [1, 2, 3])
+    frame = FrameBuilder().build(simulation)
+    assert len(frame.triangles) == len(BEAR.triangles)
+    shown = frame.points[frame.triangles]
+    expected = (BODY.placed(BEAR.points) @ turn.T + [1, 2, 3])[BEAR.triangles]
+    np.testing.assert_allclose(shown, expected, atol=1e-5)
+
+
+def test_values_and_colors_ride_along():
+    painted = replace(BEAR, colors=np.tile([0.1, 0.8, 0.3], (len(BEAR.points), 1)))
+    scene = tf.Scene(bodies=[replace(BODY, embed=painted), tf.Body(mesh=tf.TetMesh.bar())])
+    frame = FrameBuilder().build(tf.Simulation(scene))
+    own = np.abs(frame.colors - [0.1, 0.8, 0.3]).max(axis=1) < 1e-6
+    assert own.sum() == len(BEAR.triangles) < len(frame.triangles)
+    seen = replace(scene, view=tf.View(color="displacement"))
+    frame = FrameBuilder().build(tf.Simulation(seen))
+    assert frame.values.shape == (len(frame.points),)
+
+
+@pytest.mark.parametrize("format", ["obj", "ply"])
+def test_surfaces_are_exported_in_place_of_the_cage(tmp_path, format):
+    import trimesh
+
+    simulation = tf.Simulation(tf.Scene(bodies=[BODY]))
+    export = open_export(tmp_path, format, simulation)
+    export.write(simulation)
+    found = trimesh.load(export.files[0], process=False)
+    assert len(found.faces) == len(BEAR.triangles)
+    np.testing.assert_allclose(
+        found.bounds, [BODY.placed(BEAR.points).min(0), BODY.placed(BEAR.points).max(0)], atol=1e-5
+    )
+
+
+def test_triangles_go_with_the_piece_that_holds_them():
+    """A cage torn in two: no triangle is stretched across the gap, and crack faces close it."""
+    material = tf.Material(youngs=1e6, fracture=tf.Fracture(toughness=1e4))
+    low = tf.BoxRegion(lower=(-9, -9, -9), upper=(9, 9, 0.25))
+    high = tf.BoxRegion(lower=(-9, -9, 0.6), upper=(9, 9, 9))
+    away = tf.Motion(times=(0, 0.3), translation=[(0, 0, 0), (0, 0, 1.0)])
+    body = tf.Body(mesh=CAGE, embed=BEAR, material=material, pins=[low, tf.Pin(region=high, motion=away)])
+    simulation = tf.Simulation(tf.Scene(bodies=[body], gravity=(0, 0, 0)))
+    simulation.advance(seconds=0.5)
+    assert simulation.piece_count > 1
+    seen = Skin().of(simulation)
+    points = seen.follow(simulation.positions, simulation.cells)
+    own = ~seen.cracked
+    assert own.sum() == len(BEAR.triangles) and seen.cracked.any()
+    edges = points[seen.triangles[own]]
+    rest = BEAR.points[BEAR.triangles]
+    longest = np.linalg.norm(edges - np.roll(edges, 1, axis=1), axis=2).max()
+    assert longest < 0.5 < points[:, 2].max() - 1.0
+    assert longest < 6 * np.linalg.norm(rest - np.roll(rest, 1, axis=1), axis=2).max()
+    assert seen.pieces.max() < simulation.piece_count
+
+
+def test_modal_bodies_touch_with_what_is_embedded():
+    """The embedded vertices stay out of the ground, which the cage may enter."""
+    material = tf.Material(model="modal", modes=10, youngs=2e5, mass_damping=2.0)
+    body = replace(BODY, material=material, position=(0, 0, 0.1), angle=0.0)
+    simulation = tf.simulate(tf.Scene(bodies=[body], colliders=[tf.PlaneCollider()]))
+    simulation.advance(seconds=1.5)
+    seen = Skin().of(simulation)
+    height = seen.follow(simulation.positions, simulation.cells)[np.unique(seen.triangles), 2]
+    assert -2e-3 < height.min() < 2e-3
+    assert simulation.positions[:, 2].min() < -2e-3
