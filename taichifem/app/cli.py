@@ -261,10 +261,11 @@ def info() -> None:
     help="The Python of an environment that has that program. May be given again.  [default: this one]",
 )
 @click.option("--peer-limit", type=float, default=300.0, show_default=True, help="Seconds for one program and bar.")
+@click.option("--fracture", is_flag=True, help="Instead: a plate that shatters, and a bar in steps with 50 splits.")
 @click.option("--json", "json_file", type=FILE, metavar="FILE", help="Write all figures to this file, too.")
 @click.option("--plot", type=FILE, metavar="FILE", help="Draw time over size: .png, .pdf or .svg.")
 @machine_options()
-def bench(**options: Any) -> None:
+def bench(fracture: bool, **options: Any) -> None:
     """Measure speed, start-up and memory.
 
     Each bar (1 x 0.25 x 0.25 m, one end held, released at rest, 60 steps a second) runs in a process of its own.
@@ -278,10 +279,16 @@ def bench(**options: Any) -> None:
       taichifem bench --sizes 1k,5k --no-cold
       taichifem bench --stiffness 1e5,1e6,1e7 --json bench.json
       taichifem bench --sizes 20k --plasticity von-mises
+      taichifem bench --fracture
       taichifem bench --sizes 1k,20k,100k --model modal --modes 50
       taichifem bench --sizes 1k,5k,20k,100k,1m --plot bench.png     needs: pip install "taichifem[plot]"
       taichifem bench --sizes 5k --against mujoco,newton --peer-python newton=~/newton/bin/python
     """
+    if fracture:
+        from taichifem.app.bench_fracture import run_fracture_bench
+
+        run_fracture_bench(**{name: options[name] for name in ("arch", "threads", "precision", "json_file")})
+        return
     from taichifem.app.bench import run_bench
     from taichifem.app.bench_input import BenchOptions
 

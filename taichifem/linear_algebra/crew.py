@@ -127,16 +127,14 @@ def _run_one(w: ti.template(), n: ti.i32, kind: ti.i32, level: ti.i32, pieces: t
             _conclude(w, kind, level, pieces, tolerance, most)
 
 
-def run(w: World, n: int, program: np.ndarray, limits: Limits, *, rounds: int, plain: bool) -> None:
-    """Repeat the operations of the program (k,3) until the solve is done, at most `rounds` times.
+def run(w: World, n: int, operations: np.ndarray, limits: Limits, *, rounds: int, begin: int = 0) -> None:
+    """Repeat some operations (k,3), which stand in the world from `begin` on, until the solve is done.
 
-    plain: those without levels.
+    rounds: times at most.
     """
-    levelled = len(program) - p.PLAIN_ROUND
-    begin, end = (levelled, len(program)) if plain else (0, levelled)
     if runtime.running_arch() == "cpu":
-        _run_together(w, runtime.threads(), n, begin, end - begin, rounds, limits.tolerance, limits.most)
+        _run_together(w, runtime.threads(), n, begin, len(operations), rounds, limits.tolerance, limits.most)
         return
     for _ in range(rounds):
-        for kind, level, pieces in program[begin:end].tolist():
+        for kind, level, pieces in operations.tolist():
             _run_one(w, n, kind, level, pieces, limits.tolerance, limits.most)

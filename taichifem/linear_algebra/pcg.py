@@ -109,10 +109,11 @@ def _iterate(w: World, n: int, program: np.ndarray, limits: Limits, *, plain: bo
 
     Splinters may be so stiff and light that single precision leaves nothing of the matrices of their rigid motions.
     """
-    length = PLAIN_ROUND if plain else len(program) - PLAIN_ROUND
-    rounds, idle, best = min(ROUNDS, MOST_TURNS // length), 0, math.inf
+    levelled = len(program) - PLAIN_ROUND
+    begin, end = (levelled, len(program)) if plain else (0, levelled)
+    rounds, idle, best = min(ROUNDS, MOST_TURNS // (end - begin)), 0, math.inf
     while True:
-        crew.run(w, n, program, limits, rounds=rounds, plain=plain)
+        crew.run(w, n, program[begin:end], limits, rounds=rounds, begin=begin)
         residual = w.scalar[RESIDUAL]
         if not plain and w.scalar[RZ] < 0:
             return False

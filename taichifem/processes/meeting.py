@@ -56,12 +56,21 @@ def _face(w: ti.template(), e: ti.i32, a: ti.i32):
 
 @ti.func
 def _inside(w: ti.template(), e: ti.i32, point, margin):
-    """Is the point in the tetrahedron, farther from all faces than the margin?"""
-    inside = 1
+    """Is the point in the tetrahedron, and not just on the surface of its piece, by a margin?
+
+    On faces between tetrahedra it counts as inside; on edges and corners too, unless these belong to the surface.
+    """
+    inside, near, hidden = 1, 0, 0
     for a in range(4):
         normal, p = _face(w, e, a)
-        inside &= ti.cast(normal.dot(point - p) < -margin * normal.norm(), ti.i32)
-    return inside
+        depth = normal.dot(p - point) / normal.norm()
+        if depth < (margin if w.beside[e][a] < 0 else -0.01 * margin):
+            inside = 0
+        if depth < margin:
+            near += 1
+        elif w.outward[w.cell[e][a]].norm_sqr() == 0:
+            hidden = 1
+    return inside == 1 and (near < 2 or hidden == 1)
 
 
 @ti.kernel
