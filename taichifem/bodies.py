@@ -23,9 +23,9 @@ from taichifem.linear_algebra.program import write_program
 from taichifem.linear_algebra.spectrum import highest_frequency
 from taichifem.processes.loading import Loading
 from taichifem.room import room_for
-from taichifem.skin import Skin, whole_skin
 from taichifem.structure.levels import Levels, stack_levels
 from taichifem.structure.pattern import BlockPattern, block_pattern, to_sparse
+from taichifem.surface import Surface, whole_surface
 from taichifem.surroundings import Surroundings, pose
 from taichifem.world import Counts, World, acquire
 
@@ -48,7 +48,7 @@ class Bodies:
         if any(m.reduced for m in self._materials):
             raise InputError('the scene has reduced models: use taichifem.simulate(scene), or model = "linear"')
         self._laws = Laws(self._materials, exact=scene.integrator in EXACT)
-        self._first_skin = whole_skin(scene)
+        self._first_surface = whole_surface(scene)
         self._take(layout)
         self._generation = runtime.generation
         room = room_for(scene, layout, self._laws, pattern=self._pattern, levels=self._levels, program=self._program)
@@ -180,16 +180,16 @@ class Bodies:
     @property
     def surface(self) -> np.ndarray:
         """Outward triangles of all bodies (k,3), as node indices; of planar bodies, all their elements."""
-        return self._skin.triangles
+        return self._surface.triangles
 
     @property
     def surface_bodies(self) -> np.ndarray:
         """Body of each surface triangle (k,)."""
-        return self._skin.bodies
+        return self._surface.bodies
 
     @property
-    def _skin(self) -> Skin:
-        return self._first_skin
+    def _surface(self) -> Surface:
+        return self._first_surface
 
     # State
 

@@ -9,9 +9,9 @@ from taichifem.bodies import Bodies
 from taichifem.description import Scene
 from taichifem.errors import InputError
 from taichifem.processes import fracture
-from taichifem.skin import Skin, split_skin
 from taichifem.structure.pieces import label_pieces
 from taichifem.structure.splitting import Splitting
+from taichifem.surface import Surface, split_surface
 from taichifem.topology import split_layout
 
 
@@ -25,7 +25,7 @@ class BreakingBodies(Bodies):
         self._intact = self._splitting.beside.copy() if self._may_break else None
         self.splits, self.more_splits = 0, False  # in the last step: how many, and was the cap hit?
         self._pieces: tuple[int, np.ndarray, np.ndarray] | None = None
-        self._opened: Skin | None = None
+        self._opened: Surface | None = None
 
     @property
     def cells(self) -> np.ndarray:
@@ -60,7 +60,7 @@ class BreakingBodies(Bodies):
     @property
     def crack_faces(self) -> np.ndarray:
         """Which triangles of the surface (k,) fracture has opened."""
-        return self._skin.cracked
+        return self._surface.cracked
 
     @property
     def _labelled(self) -> tuple[int, np.ndarray, np.ndarray]:
@@ -70,11 +70,11 @@ class BreakingBodies(Bodies):
         return self._pieces
 
     @property
-    def _skin(self) -> Skin:
+    def _surface(self) -> Surface:
         if not self._may_break:
-            return super()._skin
+            return super()._surface
         if self._opened is None:
-            self._opened = split_skin(self.cells, self._splitting.beside, self._intact, self.cell_bodies)
+            self._opened = split_surface(self.cells, self._splitting.beside, self._intact, self.cell_bodies)
         return self._opened
 
     def _break(self, step: int) -> bool:
