@@ -145,7 +145,7 @@ def test_ctrl_c_ends_with_the_table(tiny, monkeypatch):
         (["--vary", "=stvk,linear"], ["KEY=A,B,C"]),
         (["--vary", "model=stvk"], ["1 choice cannot", "2 to 9"]),
         (["--vary", "youngs=1,2,3,4,5,6,7,8,9,10"], ["10 choices", "2 to 9"]),
-        (["--vary", "modle=stvk,linear"], ["'modle'", "did you mean 'model'?"]),
+        (["--vary", "modell=stvk,linear"], ["'modell'", "did you mean 'model'?"]),
         (["--vary", "model=stvk,lienar"], ["'lienar'", "choose one of", "'linear'"]),
         (["--vary", "model=linear:stvk,stvk"], ["only invertible wraps"]),
         (["--vary", "body.bar.scale=1,2"], ["body has no entry bar"]),
@@ -234,7 +234,7 @@ def test_what_cannot_be_simulated_names_the_choice(tiny, monkeypatch):
     def refusing(*_, **__):
         raise InputError("give more substeps")
 
-    monkeypatch.setattr("taichifem.simulation.Simulation", refusing)
+    monkeypatch.setattr("taichifem.factory.Simulation", refusing)
     assert_refused(call("compare", tiny, *TWO), "--vary model=linear: give more substeps")
 
 

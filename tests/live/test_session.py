@@ -181,7 +181,8 @@ def storm(serving, client, seconds):
     return halted, memory
 
 
-@pytest.mark.parametrize("seconds", [5, pytest.param(120, marks=pytest.mark.slow)])
+@pytest.mark.slow
+@pytest.mark.parametrize("seconds", [5, 120])
 def test_sliders_at_their_ends_in_quick_succession_break_nothing(serving, client, seconds):
     client.until(lambda: "panel" in client.last)
     halted, memory = storm(serving, client, seconds)
