@@ -9,7 +9,11 @@ from serving import Serving
 
 import taichifem as tf
 
-pytestmark = pytest.mark.skipif(chromium() is None, reason="Chromium is not installed: nothing to look at pages with")
+pytestmark = [
+    pytest.mark.skipif(chromium() is None, reason="Chromium is not installed: nothing to look at pages with"),
+    # Without a GPU the page draws a few pictures a second, and what is looked at may be older than what was done.
+    pytest.mark.flaky(reruns=3),
+]
 
 SCENE = """\
 name = "bar"
