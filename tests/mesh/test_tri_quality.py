@@ -68,7 +68,7 @@ def test_the_command_reports_and_converts(tmp_path):
 
 def test_the_command_refuses_in_one_line(tmp_path):
     TetMesh.bar(cells=(1, 1, 1)).write(tmp_path / "bar.vtu")
-    for arguments, words in (((), "holds tetrahedra"), (("--tets", 50), "--tets fills a surface")):
+    for arguments, words in (((), "holds tetrahedra"), (("--tets", 50), "--tets and --cage")):
         result = call("mesh", tmp_path / "bar.vtu", "--planar", *arguments)
         assert result.exit_code == 2
         assert len(result.stderr.splitlines()) == 1 and words in result.stderr
