@@ -38,10 +38,15 @@ def stretched(points, law: tf.Material) -> tf.Simulation:
     return quasi_static(tf.Body(mesh=tf.TetMesh.bar(**CUBE), material=law, pins=[*rollers, grip]))
 
 
-@pytest.mark.parametrize("law", ["von-mises", "tresca"])
-@pytest.mark.parametrize("case", range(3))
+@pytest.mark.parametrize(
+    ("law", "case"), [("von-mises", 0), ("von-mises", 1), ("von-mises", 2), ("tresca", 1), ("tresca", 2)]
+)
 def test_uniaxial_path(oracles, law, case):
-    """Load, unload, reload and reverse with linear hardening; the two laws agree there."""
+    """Load, unload, reload and reverse with linear hardening; the two laws agree there.
+
+    Without hardening (case 0) Tresca's law leaves open where the bar flows sideways, and how: round-off decides
+    whether Newton's method finds one of the many balances.
+    """
     cases = json.loads((oracles / "j2_uniaxial_path.json").read_text())["cases"]
     data, scale = [row for row in cases if row["hardening"] == "isotropic"][case], 1e-9
     limits = dict(yield_stress=data["sigma_y"] * scale, hardening=data["H"] * scale)
