@@ -8,8 +8,9 @@ from taichifem.structure.aggregates import Aggregates
 from taichifem.structure.levels import Levels
 from taichifem.world import DENSE, World
 
-FIRM = 0.01
-"""Size, in terms of the largest, below which a motion of an aggregate counts as one that has no stiffness."""
+FIRM = {"f32": 4e-6, "f64": 1e-12}
+"""Added to the diagonal of an aggregate's matrix, in terms of its largest entry: well above what round-off leaves of
+a motion without stiffness."""
 
 
 @ti.func
@@ -121,45 +122,26 @@ def _gather_level(w: ti.template(), n: ti.i32, level: ti.i32, first: ti.i32, end
 
 
 @ti.func
-def _size(w: ti.template(), M):
-    """The largest entry on the diagonal; 1 if there is none."""
-    largest = ti.max(M[0, 0], M[1, 1], M[2, 2])
-    return largest if largest > 0 else ti.cast(1.0, w.real)
-
-
-@ti.func
-def _firm(w: ti.template(), M, size):
-    """M with a diagonal that can be inverted: motions that no node can follow (all pinned, or in a line) have none.
-
-    size: of the aggregate's matrix. Shifts and turns are of one size, so that round-off of either is far below it.
-    """
-    for a in ti.static(range(3)):
-        M[a, a] += ti.cast(1e-4, w.real) * ti.max(M[a, a], ti.cast(FIRM, w.real) * size)
-    return M
-
-
-@ti.func
-def _inverse(w: ti.template(), M):
-    """Of entries of any size: unscaled, determinants of the small ones would be zero in single precision."""
-    size = _size(w, M)
-    return (M / size).inverse() / size
-
-
-@ti.func
 def _invert_own(w: ti.template(), n: ti.i32, g: ti.i32):
-    """The inverse of an aggregate's own matrix [[A, B], [B^T, D]], by Schur's complement of A."""
+    """The inverse of an aggregate's own matrix [[A, B], [B^T, D]], by Schur's complement of A.
+
+    In double precision: of a splinter that a stiff spring holds, single precision would leave nothing that is positive.
+    """
     k = w.own_block[g]
     width = w.row_start[n + 2 * g + 1] - w.row_start[n + 2 * g]
-    size = ti.max(_size(w, w.block[k]), _size(w, w.block[k + width + 1]))
-    inverse = _inverse(w, _firm(w, w.block[k], size))
-    B = w.block[k + 1]
-    half = inverse @ B
-    rest = _inverse(w, _firm(w, w.block[k + width + 1], size) - B.transpose() @ half)
+    A, B, D = ti.cast(w.block[k], ti.f64), ti.cast(w.block[k + 1], ti.f64), ti.cast(w.block[k + width + 1], ti.f64)
+    size = ti.max(A[0, 0], A[1, 1], A[2, 2], D[0, 0], D[1, 1], D[2, 2])
+    # Motions that no node can follow (all pinned, or in a line) have nothing on the diagonal.
+    scale = 1 / size if size > 0 else ti.cast(1.0, ti.f64)
+    firm = ti.cast(FIRM[w.precision], ti.f64) * ti.Matrix.identity(ti.f64, 3)
+    inverse = (scale * A + firm).inverse()
+    half = inverse @ (scale * B)
+    rest = (scale * D + firm - scale * B.transpose() @ half).inverse()
     across = half @ rest
-    w.own_inverse[4 * g] = inverse + across @ half.transpose()
-    w.own_inverse[4 * g + 1] = -across
-    w.own_inverse[4 * g + 2] = -across.transpose()
-    w.own_inverse[4 * g + 3] = rest
+    w.own_inverse[4 * g] = ti.cast(scale * (inverse + across @ half.transpose()), w.real)
+    w.own_inverse[4 * g + 1] = ti.cast(-scale * across, w.real)
+    w.own_inverse[4 * g + 2] = ti.cast(-scale * across.transpose(), w.real)
+    w.own_inverse[4 * g + 3] = ti.cast(scale * rest, w.real)
 
 
 @ti.func
