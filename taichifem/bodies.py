@@ -120,7 +120,7 @@ class Bodies:
         with self._kernels():
             transfer.fill_table(self._world, rows, self._layout.body_start, flies)
             inertia = self.scene.integrator != "quasi-static"
-            elements.gather_masses(self._world, self._counts.nodes, self._counts.bodies, inertia)
+            elements.gather_masses(self._world, self._counts.nodes, self._layout.piece_start, inertia)
         self._counts.flying = int((flies != balance.HELD).sum())
 
     def _surround(self, time: float, dt: float, *, all_act: bool = False) -> None:

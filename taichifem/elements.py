@@ -257,11 +257,12 @@ def measure(w: ti.template(), n_elements: ti.i32, due: ti.f64, most: ti.i32):
 
 
 @ti.kernel
-def gather_masses(w: ti.template(), n: ti.i32, n_bodies: ti.i32, inertia: ti.i32):
+def gather_masses(w: ti.template(), n: ti.i32, piece_start: ti.types.ndarray(dtype=ti.i32, ndim=1), inertia: ti.i32):
     """Lumped mass and mass-proportional damping of the nodes, and what sizes their contact springs.
 
     `w.contact_stiffness` [N/m] is the mean diagonal entry of the node's own stiffness block at rest, which no
-    rotation changes; `w.body_mass` [kg] is the mass of its body, 0 without inertia.
+    rotation changes; `w.piece_mass` [kg] is the mass of its piece, 0 without inertia.
+    piece_start (pieces+1,): the first node of each piece, and the end of the last.
     """
     for i in range(n):
         mass, drag, stiffness = ti.cast(0.0, w.real), ti.cast(0.0, w.real), ti.cast(0.0, w.real)
@@ -276,9 +277,9 @@ def gather_masses(w: ti.template(), n: ti.i32, n_bodies: ti.i32, inertia: ti.i32
         w.mass[i] = mass
         w.drag[i] = drag
         w.contact_stiffness[i] = stiffness
-    for b in range(n_bodies):
+    for p in range(piece_start.shape[0] - 1):
         total = ti.cast(0.0, ti.f64)
-        for i in range(w.body_start[b], w.body_start[b + 1]):
+        for i in range(piece_start[p], piece_start[p + 1]):
             total += ti.cast(w.mass[i], ti.f64)
-        for i in range(w.body_start[b], w.body_start[b + 1]):
-            w.body_mass[i] = ti.cast(total, w.real) if inertia else ti.cast(0.0, w.real)
+        for i in range(piece_start[p], piece_start[p + 1]):
+            w.piece_mass[i] = ti.cast(total, w.real) if inertia else ti.cast(0.0, w.real)

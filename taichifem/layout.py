@@ -52,7 +52,8 @@ class Layout:
 
     dimension d: 3 for tetrahedra, 2 for triangles in the plane y = 0.
     rest (n,3) [m], velocities (n,3) [m/s], cells (m,d+1), thickness (m,) [m] (1 in space), node_bodies (n,),
-    cell_bodies (m,), cell_materials (m,) into `materials`, regions (m,), body_start (bodies+1,).
+    cell_bodies (m,), cell_materials (m,) into `materials`, regions (m,), body_start (bodies+1,),
+    piece_start (pieces+1,): pieces are bodies, and what has come off them.
 
     Nodes are numbered such that those of an aggregate of the solver follow one another, and elements after their
     nodes: what is used together lies together. node_order (n,), cell_order (m,): the numbers they had in the scene.
@@ -68,6 +69,7 @@ class Layout:
     cell_materials: np.ndarray
     regions: np.ndarray
     body_start: np.ndarray
+    piece_start: np.ndarray
     materials: list[Material]
     material_of: dict[tuple[int, int | None], int]
     aggregates: Aggregates
@@ -220,6 +222,7 @@ def lay_out(scene: Scene) -> Layout:
         cell_materials=np.concatenate(cell_materials)[elements],
         regions=np.concatenate(regions)[elements],
         body_start=np.asarray(body_start, dtype=np.int32),
+        piece_start=np.asarray(body_start, dtype=np.int32),
         materials=materials,
         material_of=material_of,
         aggregates=aggregates,

@@ -13,7 +13,7 @@ from taichifem.layout import Layout
 from taichifem.linear_algebra.program import most_operations
 from taichifem.structure.levels import Levels
 from taichifem.structure.pattern import BlockPattern
-from taichifem.structure.regrouping import most_aggregates
+from taichifem.structure.regrouping import MORE_LEVELS, most_aggregates
 from taichifem.world import Capacity
 
 
@@ -50,15 +50,15 @@ def room_for(
 def _meeting(apart: Capacity, layout: Layout) -> Capacity:
     """Springs between half as many pairs of nodes and faces as there are elements, each of which makes three pairs."""
     springs = max(64, len(layout.cells) // 2)
-    coarse = apart.coarse_pairs + 3 * springs * (layout.aggregates.levels + 1)
+    coarse = apart.coarse_pairs + 3 * springs * (layout.aggregates.levels + MORE_LEVELS)
     return replace(
         apart,
         blocks=apart.blocks + 6 * springs,
         pairs=apart.pairs + 3 * springs,
         coarse_blocks=8 * coarse,
         coarse_pairs=coarse,
-        members=apart.members + 3 * springs * (layout.aggregates.levels + 1),
-        operations=most_operations(layout.aggregates.levels + 1),
+        members=apart.members + 3 * springs * (layout.aggregates.levels + MORE_LEVELS),
+        operations=most_operations(layout.aggregates.levels + MORE_LEVELS),
         meetings=springs,
     )
 
@@ -85,5 +85,5 @@ def _broken(whole: Capacity, layout: Layout) -> Capacity:
         coarse_blocks=8 * coarse_pairs,
         coarse_pairs=coarse_pairs,
         members=pairs + coarse_pairs,
-        operations=most_operations(levels + 1),
+        operations=most_operations(levels + MORE_LEVELS),
     )

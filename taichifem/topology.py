@@ -10,23 +10,20 @@ from taichifem.layout import Group, Layout, LoadGroup
 from taichifem.structure.regrouping import regroup
 
 
-def split_layout(layout: Layout, cells: np.ndarray, origin: np.ndarray, piece: np.ndarray) -> Layout:
+def split_layout(layout: Layout, cells: np.ndarray, origin: np.ndarray) -> Layout:
     """The layout of a scene whose mesh was split, from that of the whole one.
 
     cells (m,d+1): the elements in the scene's order, of nodes and copies of them.  origin (n,): of which node of the
-    scene each is a copy; the first ones are the nodes themselves, copies come last.  piece (n,): of each node, those
-    of a body before those of the next.
+    scene each is a copy; the first ones are the nodes themselves, copies come last.
     Pins and handles hold copies too; what pulls or presses is shared out anew, its sum stays. Elements stay where
-    they were, and nodes come piece by piece, in the old order: to the solver each piece is a body, no rigid motion
-    that it works with joins two of them.
+    they were, and nodes come piece by piece, as their aggregates do.
     """
     old = layout.node_number[origin]
-    node_order = np.argsort(piece.astype(np.int64) * len(layout.rest) + old, kind="stable")
-    number = np.empty(len(origin), dtype=np.int32)
-    number[node_order] = np.arange(len(origin), dtype=np.int32)
-    node_from = old[node_order]
-    bodies = layout.node_bodies[node_from]
-    corners = number[cells[layout.cell_order]]
+    sorted_by_old = np.argsort(old, kind="stable")
+    placed, old = _inverse(sorted_by_old)[cells[layout.cell_order]], old[sorted_by_old]
+    aggregates, piece_start = regroup(layout.aggregates, placed, old, layout.node_bodies[old])
+    node_order, node_from = sorted_by_old[aggregates.order], old[aggregates.order]
+    bodies, corners = layout.node_bodies[node_from], _inverse(aggregates.order)[placed]
     return replace(
         layout,
         rest=layout.rest[node_from],
@@ -34,12 +31,20 @@ def split_layout(layout: Layout, cells: np.ndarray, origin: np.ndarray, piece: n
         cells=corners,
         node_bodies=bodies,
         body_start=np.searchsorted(bodies, np.arange(len(layout.body_start))).astype(np.int32),
-        aggregates=regroup(layout.aggregates, node_from, piece[node_order]),
+        piece_start=piece_start,
+        aggregates=aggregates,
         node_order=node_order,
         pins=[_group(group, layout, node_from) for group in layout.pins],
         handles=[_group(group, layout, node_from) for group in layout.handles],
         loads=[_load(layout, k, corners, node_from) for k in range(len(layout.loads))],
     )
+
+
+def _inverse(order: np.ndarray) -> np.ndarray:
+    """Where in an order (n,) each number stands."""
+    place = np.empty(len(order), dtype=np.int32)
+    place[order] = np.arange(len(order), dtype=np.int32)
+    return place
 
 
 def _group(group: Group, layout: Layout, node_from: np.ndarray) -> Group:

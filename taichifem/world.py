@@ -234,8 +234,8 @@ class World:
         self.collider_rotation0, self.collider_center0 = self._matrix(k, 3, 3), self._vector(k, 3)
         self.collider_size, self.collider_friction = self._vector(k, 3), self._scalar(k)
         self.collider_velocity, self.collider_spin = self._vector(k, 3), self._vector(k, 3)
-        # A node's own stiffness at rest [N/m], and the mass of its body [kg]: they size its contact springs.
-        self.contact_stiffness, self.body_mass = self._scalar(c.nodes), self._scalar(c.nodes)
+        # A node's own stiffness at rest [N/m], and the mass of its piece [kg]: they size its contact springs.
+        self.contact_stiffness, self.piece_mass = self._scalar(c.nodes), self._scalar(c.nodes)
         self.slip = ti.Vector.field(3, self.real)
         self.pressed = ti.field(self.real)  # normal force that friction was last set for [N]
         self.touching = ti.field(ti.i32)

@@ -57,7 +57,7 @@ def _shatter(precision: str) -> dict:
         stiffness_damping=5e-4,
         fracture=Fracture(toughness=1.5e5),
     )
-    fall = Motion(times=(0.0, 0.2, 0.4, 0.6), translation=((0, 0, 0), (0, 0, -0.4), (0, 0, -0.8), (0, 0, 0)))
+    fall = Motion(times=(0.0, 0.2, 0.4, 0.6), translation=((0, 0, 0), (0, 0, -0.4), (0, 0, -0.7), (0, 0, 0)))
     ball = SphereCollider(center=(0.65, 0.45, 0.87), radius=0.12, motion=fall)
     body = Body(mesh=mesh, material=glass, position=(0, 0, 0.3), pins=_ends(1.2))
     scene = Scene(bodies=[body], colliders=[PlaneCollider(friction=0.6), ball], fps=FPS, max_splits=1000, seed=3)

@@ -2,7 +2,7 @@
 
 A node that ends the step inside a collider is pushed out by a spring along the normal, `STIFFNESS` times as stiff as
 the node itself: a soft body sinks in by a tenth of what it gives way. It need never be stiffer than what stops the
-whole body within a step, M / dt^2, nor softer than what stops the node, m / dt^2; without inertia neither counts.
+whole piece within a step, M / dt^2, nor softer than what stops the node, m / dt^2; without inertia neither counts.
 Friction is a spring too, from the place where the node began to stick, and slips when it passes mu times the normal
 force; its stretch is kept from step to step, so that a body at rest on a slope stays there (Cundall & Strack 1979).
 Both are taken at the end of the step, and which nodes touch and slip is settled by solving again while that still
@@ -43,8 +43,8 @@ def stiffness(w: ti.template(), i: ti.i32, h):
     """Stiffness [N/m] of the contact springs of node i."""
     inertia = 1 / (h * h)
     own = w.contact_stiffness[i]
-    if w.body_mass[i] > 0:
-        own = ti.max(ti.min(own, w.body_mass[i] * inertia), w.mass[i] * inertia)
+    if w.piece_mass[i] > 0:
+        own = ti.max(ti.min(own, w.piece_mass[i] * inertia), w.mass[i] * inertia)
     return ti.cast(STIFFNESS, w.real) * own
 
 

@@ -9,32 +9,34 @@ _list = ti.types.ndarray(ndim=1)
 
 
 @ti.func
-def _root(above: ti.template(), node: ti.i32):
-    """The root of a node's tree; on the way, nodes are hung on those above their parents."""
+def root_of(above: ti.template(), row: ti.i32, node: ti.i32):
+    """The root of a node's tree, in a row of trees; on the way, nodes are hung on those above their parents."""
     i = node
-    while above[i] != i:
-        above[i] = above[above[i]]
-        i = above[i]
+    while above[row, i] != i:
+        above[row, i] = above[row, above[row, i]]
+        i = above[row, i]
     return i
 
 
 @ti.kernel
-def _label(corners: ti.template(), cells: _list, above: _list, of_node: _list, of_cell: _list, found: _list):
+def _label(
+    corners: ti.template(), cells: _list, above: ti.types.ndarray(ndim=2), of_node: _list, of_cell: _list, found: _list
+):
     """above: every node its own at first.  of_node: -1 at first."""
     ti.loop_config(serialize=True)
     for _ in range(1):
         m, count = of_cell.shape[0], 0
         for e in range(m):
-            first = _root(above, cells[corners * e])
+            first = root_of(above, 0, cells[corners * e])
             for a in range(1, corners):
-                other = _root(above, cells[corners * e + a])
+                other = root_of(above, 0, cells[corners * e + a])
                 if other < first:
-                    above[first] = other
+                    above[0, first] = other
                     first = other
                 else:
-                    above[other] = first
+                    above[0, other] = first
         for e in range(m):
-            root = _root(above, cells[corners * e])
+            root = root_of(above, 0, cells[corners * e])
             if of_node[root] < 0:
                 of_node[root] = count
                 count += 1
@@ -53,5 +55,5 @@ def label_pieces(cells: np.ndarray, n_nodes: int) -> tuple[int, np.ndarray, np.n
     of = np.int32
     flat = np.ascontiguousarray(cells, dtype=of).ravel()
     of_node, of_cell, found = np.full(n_nodes, -1, dtype=of), np.empty(len(cells), dtype=of), np.zeros(1, dtype=of)
-    _label(cells.shape[1], flat, np.arange(n_nodes, dtype=of), of_node, of_cell, found)
+    _label(cells.shape[1], flat, np.arange(n_nodes, dtype=of)[None], of_node, of_cell, found)
     return int(found[0]), of_cell, of_node
