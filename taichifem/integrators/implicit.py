@@ -36,6 +36,9 @@ LOOSEST = 0.1
 NEAR = 0.1
 """Imbalance, relative to the forces at work, below which tangents are exact."""
 
+PASS = 25
+"""Iterations of a solve with slack at most: the next one goes on from where it ends, with contacts renewed."""
+
 ALWAYS = 1e30
 """A weight so large that residuals are measured against impulses alone, as befits a static problem."""
 
@@ -137,7 +140,7 @@ def solve(step: Step, *, h: float, newton: int, inertia: bool = True) -> StepRep
                 step.program,
                 step.galerkin,
                 tolerance=min(step.options.tolerance * slack, LOOSEST),
-                max_iterations=step.options.max_iterations,
+                max_iterations=step.options.max_iterations if slack == 1 else PASS,
                 noise=noise,
                 weight=weight,
                 drag_factor=h * inertia,
