@@ -46,6 +46,13 @@ class LoadGroup:
     thickness: float = 1.0
 
 
+def place_in(order: np.ndarray) -> np.ndarray:
+    """Where in an order (n,) each number stands."""
+    place = np.empty(len(order), dtype=np.int32)
+    place[order] = np.arange(len(order), dtype=np.int32)
+    return place
+
+
 @dataclass
 class Layout:
     """Arrays of a whole scene. Nodes and elements of a body are a contiguous range.
@@ -96,7 +103,12 @@ class Layout:
     @cached_property
     def node_number(self) -> np.ndarray:
         """The number (n,) here of each node of the scene."""
-        return np.argsort(self.node_order)
+        return place_in(self.node_order)
+
+    @cached_property
+    def cell_number(self) -> np.ndarray:
+        """The number (m,) here of each element of the scene."""
+        return place_in(self.cell_order)
 
     @cached_property
     def load_corners(self) -> list[tuple[np.ndarray, np.ndarray] | None]:

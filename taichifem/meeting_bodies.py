@@ -53,8 +53,7 @@ class MeetingBodies(BreakingBodies):
         """Tell the world which elements are beside each other, and which belong together."""
         w, layout, (_, of_cell, _) = self._world, self._layout, self._labelled
         beside = self._splitting.beside if self._may_break else across(self.cells)
-        number = np.argsort(layout.cell_order)
-        beside = np.where(beside < 0, -1, number[beside])[layout.cell_order]
+        beside = np.where(beside < 0, -1, layout.cell_number[beside])[layout.cell_order]
         with self._kernels():
             transfer.write_integers(w.beside, beside)
             transfer.write_integers(w.piece, of_cell[layout.cell_order])

@@ -29,7 +29,7 @@ class Surroundings:
         self._scene, self._layout, self._world, self._counts = scene, layout, world, counts
         self._groups: list[Group] = [*layout.pins, *layout.handles]
         self._hands = hands
-        self._number = np.argsort(layout.node_order)  # of each node of the scene in the world
+        self._number = layout.node_number  # of each node of the scene in the world
         self.forget()
 
     def forget(self) -> None:

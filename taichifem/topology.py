@@ -6,7 +6,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from taichifem.layout import Group, Layout, LoadGroup
+from taichifem.layout import Group, Layout, LoadGroup, place_in
 from taichifem.structure.regrouping import regroup
 
 
@@ -20,10 +20,10 @@ def split_layout(layout: Layout, cells: np.ndarray, origin: np.ndarray) -> Layou
     """
     old = layout.node_number[origin]
     sorted_by_old = np.argsort(old, kind="stable")
-    placed, old = _inverse(sorted_by_old)[cells[layout.cell_order]], old[sorted_by_old]
+    placed, old = place_in(sorted_by_old)[cells[layout.cell_order]], old[sorted_by_old]
     aggregates, piece_start = regroup(layout.aggregates, placed, old, layout.node_bodies[old])
     node_order, node_from = sorted_by_old[aggregates.order], old[aggregates.order]
-    bodies, corners = layout.node_bodies[node_from], _inverse(aggregates.order)[placed]
+    bodies, corners = layout.node_bodies[node_from], place_in(aggregates.order)[placed]
     return replace(
         layout,
         rest=layout.rest[node_from],
@@ -38,13 +38,6 @@ def split_layout(layout: Layout, cells: np.ndarray, origin: np.ndarray) -> Layou
         handles=[_group(group, layout, node_from) for group in layout.handles],
         loads=[_load(layout, k, corners, node_from) for k in range(len(layout.loads))],
     )
-
-
-def _inverse(order: np.ndarray) -> np.ndarray:
-    """Where in an order (n,) each number stands."""
-    place = np.empty(len(order), dtype=np.int32)
-    place[order] = np.arange(len(order), dtype=np.int32)
-    return place
 
 
 def _group(group: Group, layout: Layout, node_from: np.ndarray) -> Group:

@@ -252,6 +252,7 @@ class World:
         self.outward, self.entered = self._vector(n, 3), self._scalar(n, ti.i32)
         # The hash: nodes, sorted by bucket.
         self.bucket_start, self.bucket_node = self._scalar(2 * n + 1, ti.i32), self._scalar(n, ti.i32)
+        self.bucket_pieces = self._vector(2 * n + 1, 2, ti.i32)  # the lowest and the highest that has a node there
         # Springs: a node and a face, shares, the face's normal, stiffness along and across it [N/m], gap at rest [m].
         self.meeting_cell, self.meeting_weight = self._vector(k, 4, ti.i32), self._vector(k, 4)
         self.meeting_normal, self.meeting_stiffness = self._vector(k, 3), self._vector(k, 2)

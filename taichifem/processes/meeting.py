@@ -35,6 +35,12 @@ def _bucket(w: ti.template(), cell):
 
 
 @ti.func
+def _piece(w: ti.template(), i: ti.i32):
+    """The piece that a node belongs to."""
+    return w.piece[w.incident[w.incident_start[i]] >> 2]
+
+
+@ti.func
 def _corner(w: ti.template(), e: ti.i32, a: ti.i32):
     """Where corner a of a tetrahedron is headed."""
     return w.z[w.cell[e][a]]
@@ -81,6 +87,7 @@ def _look(w: ti.template(), n: ti.i32, m: ti.i32, dt: ti.f64, size: ti.f64):
         w.entered[i] = m
     for k in range(w.bucket_start.shape[0]):
         w.bucket_start[k] = 0
+        w.bucket_pieces[k] = ti.Vector([m, -1])
     inverse, margin = ti.cast(1 / size, w.real), ti.cast(MARGIN * size, w.real)
     for i in range(n):
         normal = ti.Vector.zero(w.real, 3)
@@ -92,7 +99,10 @@ def _look(w: ti.template(), n: ti.i32, m: ti.i32, dt: ti.f64, size: ti.f64):
                     normal += outward
         w.outward[i] = normal.normalized(1e-30)
         if normal.norm_sqr() > 0:
-            ti.atomic_add(w.bucket_start[_bucket(w, ti.floor(w.z[i] * inverse, ti.i32))], 1)
+            k = _bucket(w, ti.floor(w.z[i] * inverse, ti.i32))
+            ti.atomic_add(w.bucket_start[k], 1)
+            ti.atomic_min(w.bucket_pieces[k][0], _piece(w, i))
+            ti.atomic_max(w.bucket_pieces[k][1], _piece(w, i))
     ti.loop_config(serialize=True)
     for _ in range(1):
         total = 0
@@ -111,9 +121,12 @@ def _look(w: ti.template(), n: ti.i32, m: ti.i32, dt: ti.f64, size: ti.f64):
         if (last - first).max() < 16:
             for c in ti.grouped(ti.ndrange((first[0], last[0] + 1), (first[1], last[1] + 1), (first[2], last[2] + 1))):
                 k = _bucket(w, c)
+                there, own = w.bucket_pieces[k], w.piece[e]
+                if there[0] == there[1] and there[0] == own:
+                    continue
                 for q in range(w.bucket_start[k], w.bucket_start[k + 1]):
                     i = w.bucket_node[q]
-                    if w.piece[w.incident[w.incident_start[i]] >> 2] != w.piece[e] and _inside(w, e, w.z[i], margin):
+                    if _piece(w, i) != own and _inside(w, e, w.z[i], margin):
                         ti.atomic_min(w.entered[i], e)
 
 

@@ -74,14 +74,7 @@ def _group(part: _list, size: _list, whole: _list, body: _list, weight: _list, o
             group[k] = count
 
 
-def _hanging_together(corners: int, flat: np.ndarray, keys: list[np.ndarray]) -> np.ndarray:
-    """Per key (n,) the first node (n,) of the part with the same key that each node belongs to."""
-    parts = np.tile(np.arange(len(keys[0]), dtype=np.int32), (len(keys), 1))
-    _join(corners, flat, np.array(keys, dtype=np.int32), parts)
-    return parts
-
-
-def _parts(whole: Aggregates, cells: np.ndarray, old: np.ndarray) -> list[np.ndarray]:
+def _parts(whole: Aggregates, cells: np.ndarray, old: np.ndarray) -> np.ndarray:
     """First node of the part that each node (n,) belongs to: per level of the whole mesh, and last of its piece.
 
     A part is what of an aggregate hangs together. What has hardly more nodes than an aggregate is one part.
@@ -89,19 +82,18 @@ def _parts(whole: Aggregates, cells: np.ndarray, old: np.ndarray) -> list[np.nda
     keys = [whole.parent[old]]
     for _ in range(1, whole.levels):
         keys.append(whole.parent[keys[-1] + len(whole.order)])
-    corners = np.ascontiguousarray(cells, dtype=np.int32).ravel()
-    parts = _hanging_together(cells.shape[1], corners, [*keys, np.zeros(len(old))])
-    pieces = -(-np.bincount(parts[0])[parts[0]] // SIZE)
-    if pieces.max() > 1:
-        # Where nodes have many copies, aggregates are cut as they lie: their nodes come along some axis.
-        begin, end = whole.begin[keys[0]], whole.end[keys[0]]
-        cut = MOST_CUTS * keys[0] + np.minimum(pieces, MOST_CUTS) * (old - begin) // (end - begin)
-        parts[0] = _hanging_together(cells.shape[1], corners, [cut])[0]
+    # Where nodes have many copies, the smallest aggregates are cut as they lie: their nodes come along some axis.
+    begin, end = whole.begin[keys[0]], whole.end[keys[0]]
+    cuts = np.clip((np.bincount(keys[0])[keys[0]] + SIZE // 2) // SIZE, 1, MOST_CUTS)
+    keys[0] = MOST_CUTS * keys[0] + cuts * (old - begin) // (end - begin)
+    keys = np.array([*keys, np.zeros(len(old))], dtype=np.int32)
+    parts = np.tile(np.arange(len(old), dtype=np.int32), (len(keys), 1))
+    _join(cells.shape[1], np.ascontiguousarray(cells, dtype=np.int32).ravel(), keys, parts)
     for level in reversed(range(whole.levels)):
         above = parts[level + 1]
         small = np.bincount(above)[above] <= SIZE * BRANCHES**level
         parts[level, small] = above[small]
-    return list(parts)
+    return parts
 
 
 def regroup(whole: Aggregates, cells: np.ndarray, old: np.ndarray, body: np.ndarray) -> tuple[Aggregates, np.ndarray]:
