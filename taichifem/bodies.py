@@ -22,7 +22,7 @@ from taichifem.linear_algebra.galerkin import Galerkin
 from taichifem.linear_algebra.program import write_program
 from taichifem.linear_algebra.spectrum import highest_frequency
 from taichifem.processes.loading import Loading
-from taichifem.room import room_for
+from taichifem.room import assert_room, room_for
 from taichifem.structure.levels import Levels, stack_levels
 from taichifem.structure.pattern import BlockPattern, block_pattern, to_sparse
 from taichifem.surface import Surface, whole_surface
@@ -97,6 +97,7 @@ class Bodies:
     def _fill_matrix(self) -> None:
         """Give the world what the solver has to know of the matrix."""
         pattern = self._pattern
+        assert_room(self._world.capacity, pattern, self._levels, self._program)
         self._counts.pairs, self._counts.pieces = pattern.n_pairs, pattern.pieces
         with self._kernels():
             transfer.fill_pattern(self._world, pattern)

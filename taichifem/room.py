@@ -47,6 +47,25 @@ def room_for(
     return _meeting(capacity, layout) if scene.pieces_meet else capacity
 
 
+def assert_room(capacity: Capacity, pattern: BlockPattern, levels: Levels, program: np.ndarray) -> None:
+    """Raise MemoryError if what came of a mesh that was split is more than there was thought to be room for.
+
+    Kernels do not look: what is written behind a field's end spoils another.
+    """
+    needed = {
+        "blocks": pattern.n_blocks,
+        "pairs": pattern.n_pairs,
+        "aggregates": len(levels.own),
+        "coarse_blocks": len(levels.column) - pattern.n_blocks,
+        "coarse_pairs": len(levels.pair),
+        "members": len(levels.member),
+        "operations": len(program),
+    }
+    for name, count in needed.items():
+        if count > getattr(capacity, name):
+            raise MemoryError(f"the pieces have {count} {name} and there is room for {getattr(capacity, name)}")
+
+
 def _meeting(apart: Capacity, layout: Layout) -> Capacity:
     """Springs between half as many pairs of nodes and faces as there are elements, each of which makes three pairs."""
     springs = max(64, len(layout.cells) // 2)
