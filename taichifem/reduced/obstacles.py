@@ -5,6 +5,7 @@ import numpy as np
 from taichifem import runtime
 from taichifem.description import Scene
 from taichifem.formulas import collision
+from taichifem.reduced.vectors import cross
 from taichifem.runtime import ti
 from taichifem.surroundings import collider_table
 
@@ -83,4 +84,4 @@ class Obstacles:
     def carried(self, table: np.ndarray, which: np.ndarray, points: np.ndarray, dt: float) -> np.ndarray:
         """How far (n,3) [m] the colliders `which` (n,) take points (n,3) along that stick to them, over dt [s]."""
         rows = table[which]
-        return dt * (rows[:, 8:11] + np.cross(rows[:, 11:14], points - rows[:, 5:8]))
+        return dt * (rows[:, 8:11] + cross(rows[:, 11:14], points - rows[:, 5:8]))
