@@ -9,6 +9,7 @@ forces with f (D f + d) > 0 are made shorter until that is 0. So contact takes e
 import numpy as np
 
 from taichifem import runtime
+from taichifem.reduced.vectors import cross
 from taichifem.runtime import ti
 
 SWEEPS = 60
@@ -21,9 +22,9 @@ _array = ti.types.ndarray
 def frames_of(normals: np.ndarray) -> np.ndarray:
     """Rows normal, tangent, tangent (m,3,3) for unit normals (m,3)."""
     aside = np.eye(3)[np.abs(normals).argmin(axis=1)]
-    first = np.cross(normals, aside)
+    first = cross(normals, aside)
     first /= np.linalg.norm(first, axis=1, keepdims=True)
-    return np.stack([normals, first, np.cross(normals, first)], axis=1)
+    return np.stack([normals, first, cross(normals, first)], axis=1)
 
 
 @ti.kernel

@@ -13,6 +13,7 @@ from functools import cached_property
 import numpy as np
 
 from taichifem.description import Motion
+from taichifem.reduced.vectors import skew
 from taichifem.surroundings import pose
 
 MIDPOINT_TURNS = 3
@@ -20,9 +21,7 @@ MIDPOINT_TURNS = 3
 
 def turned(rotation: np.ndarray, angle: np.ndarray) -> np.ndarray:
     """`rotation` (3,3) followed by a turn by the vector `angle` (3,) [rad] (Rodrigues)."""
-    x, y, z = angle
-    size = math.sqrt(x * x + y * y + z * z)
-    cross = np.array([[0.0, -z, y], [z, 0.0, -x], [-y, x, 0.0]])
+    size, cross = math.sqrt(angle @ angle), skew(angle)
     sine = math.sin(size) / size if size > 0 else 1.0
     half = math.sin(0.5 * size) / size if size > 0 else 0.5
     new = rotation + (sine * cross + 2 * half * half * cross @ cross) @ rotation
@@ -94,14 +93,17 @@ class FreeFrame:
 
     def velocity_at(self, points: np.ndarray) -> np.ndarray:
         """Velocities (n,3) [m/s] of points (n,3) that are at rest in it."""
-        return self.velocity + np.cross(self.spin, points - self.origin)
+        return self.velocity + (points - self.origin) @ skew(self.spin).T
 
     def levers(self, points: np.ndarray) -> np.ndarray:
         """How points (n,3) move with it: (n,3,6) for a shift and a turn."""
         found = np.zeros((len(points), 3, 6))
         found[:, :, :3] = np.eye(3)
         # d x = turn x arm
-        found[:, :, 3:] = np.cross(np.eye(3)[None, :, :], (points - self.origin)[:, None, :]).transpose(0, 2, 1)
+        x, y, z = (points - self.origin).T
+        found[:, 0, 4], found[:, 0, 5] = z, -y
+        found[:, 1, 3], found[:, 1, 5] = -z, x
+        found[:, 2, 3], found[:, 2, 4] = y, -x
         return found
 
     def answer(self) -> np.ndarray:

@@ -14,6 +14,7 @@ import numpy as np
 from taichifem.errors import InputError
 from taichifem.layout import Group
 from taichifem.reduced.frames import DrivenFrame, FreeFrame
+from taichifem.reduced.modal_skin import ClusteredSkin, Skin
 from taichifem.reduced.modes import Modes, lowest_modes
 from taichifem.reduced.oscillators import Oscillators
 from taichifem.reduced.parts import LoadField, Parts
@@ -69,17 +70,13 @@ class ModalBody:
         self.modes.v = np.einsum("n,nak,na->k", parts.masses, self.shapes, relative)
         self._drag = material.mass_damping
         # At run time only rows of the surface are worked with, in the precision of the simulation.
-        self._places, rows = self.local[parts.skin], self.shapes[parts.skin]
+        places, rows = self.local[parts.skin], self.shapes[parts.skin]
         if parts.embedded is not None:
             # The embedded surface meets colliders, by the modes of the mesh that it rides in.
             places, lies = parts.embedded
-            self._places = places - (self.frame.origin if isinstance(self.frame, FreeFrame) else 0.0)
+            places = places - (self.frame.origin if isinstance(self.frame, FreeFrame) else 0.0)
             rows = lies.points(self.shapes.reshape(len(self.shapes), -1), parts.cells).reshape(len(places), 3, -1)
-        self._middle = 0.5 * (self._places.min(axis=0) + self._places.max(axis=0))
-        self._radius = float(np.linalg.norm(self._places - self._middle, axis=1).max())
-        self._farthest = np.linalg.norm(rows, axis=1).max(axis=0)
-        real = np.float32 if precision == "f32" else np.float64
-        self._rows = np.ascontiguousarray(rows.reshape(3 * len(rows), -1), dtype=real)
+        self.skin = ClusteredSkin(places, rows, np.float32 if precision == "f32" else np.float64)
         self._moment = np.einsum("n,nak->ak", parts.masses, self.shapes)
         self._tensor = np.einsum("n,nb,nak->abk", parts.masses, self.local, self.shapes)
         self._loads = [_ModalLoad(load, self.shapes, self.local) for load in parts.loads]
@@ -89,9 +86,9 @@ class ModalBody:
 
     # State
 
-    def _at(self, frame, q: np.ndarray, local: np.ndarray, rows: np.ndarray) -> np.ndarray:
-        moved = local + (rows @ q.astype(rows.dtype)).reshape(-1, 3)
-        return moved @ frame.rotation.T + frame.origin
+    @property
+    def _nodes(self) -> Skin:
+        return Skin(self.local, self.shapes.reshape(-1, self.shapes.shape[2]))
 
     @property
     def displacement(self) -> np.ndarray:
@@ -106,7 +103,7 @@ class ModalBody:
     @property
     def positions(self) -> np.ndarray:
         """All nodes (n,3) [m], inner ones too."""
-        return self._at(self.frame, self.modes.q, self.local, self.shapes.reshape(-1, self.shapes.shape[2]))
+        return self._nodes.at(self.keep())
 
     @property
     def velocities(self) -> np.ndarray:
@@ -133,7 +130,7 @@ class ModalBody:
         return all(np.isfinite(values).all() for values in self.state().values())
 
     def keep(self) -> Trial:
-        """The state, for `take_back`."""
+        """The state, also for `take_back`."""
         return Trial(self.frame, self.modes.q, self.modes.v)
 
     def take_back(self, kept: Trial) -> None:
@@ -145,12 +142,12 @@ class ModalBody:
         found = {"q": self.modes.q, "v": self.modes.v}
         if isinstance(self.frame, FreeFrame):
             found |= {name: getattr(self.frame, name) for name in ("rotation", "origin", "velocity", "momentum")}
-        return found | {"dissipated": np.array(self.touch.dissipated)}
+        return found | self.touch.state()
 
     def set_state(self, state: dict[str, np.ndarray], time: float) -> None:
         """The inverse of `state`, at `time` [s]."""
         self.modes.q, self.modes.v = state["q"].copy(), state["v"].copy()
-        self.touch.dissipated = float(state["dissipated"])
+        self.touch.set_state(state)
         if isinstance(self.frame, FreeFrame):
             self.frame = replace(
                 self.frame, **{name: state[name] for name in ("rotation", "origin", "velocity", "momentum")}
@@ -212,35 +209,6 @@ class ModalBody:
         """How unit generalised impulses change the rates of the coordinates (r,r)."""
         return _diagonal(self.frame.answer(), np.ones(len(self.modes.q)))
 
-    def skin(self, at: Trial | None = None) -> np.ndarray:
-        """Points of the surface (s,3) [m] now, or at the end of a trial."""
-        frame, q = (self.frame, self.modes.q) if at is None else (at.frame, at.q)
-        return self._at(frame, q, self._places, self._rows)
-
-    def ball(self, at: Trial) -> tuple[np.ndarray, np.ndarray, float]:
-        """Centres (3,) now and at the end of a trial, and the radius, of a ball [m] that holds the skin meanwhile."""
-        swing = max(float(np.abs(q) @ self._farthest) for q in (self.modes.q, at.q))
-        ends = (frame.rotation @ self._middle + frame.origin for frame in (self.frame, at.frame))
-        return *ends, self._radius + swing
-
-    def levers(self, which: np.ndarray) -> np.ndarray:
-        """How points of the skin (m,) move with the coordinates (m,3,r)."""
-        return self._levers(self._places[which], self._shapes_of(which))
-
-    def _shapes_of(self, which: np.ndarray) -> np.ndarray:
-        """Rows of points of the skin (m,3,k)."""
-        return self._rows.reshape(len(self._places), 3, -1)[which].astype(float)
-
-    def _levers(self, local: np.ndarray, shapes: np.ndarray) -> np.ndarray:
-        points = self._at(self.frame, self.modes.q, local, shapes.reshape(3 * len(local), -1))
-        return np.concatenate([self.frame.levers(points), self.frame.rotation @ shapes], axis=2)
-
-    def velocities_of(self, which: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """Places and velocities (m,3) of points of the skin (m,)."""
-        shapes = self._shapes_of(which)
-        points = self._at(self.frame, self.modes.q, self._places[which], shapes.reshape(3 * len(which), -1))
-        return points, self.frame.velocity_at(points) + (shapes @ self.modes.v) @ self.frame.rotation.T
-
     def strike(self, impulse: np.ndarray) -> None:
         """Generalised impulses (r,) at once."""
         k = self.frame.coordinates
@@ -254,9 +222,9 @@ class ModalBody:
         nodes = np.concatenate([group.nodes for group in acting])
         stiffness = np.concatenate([np.full(len(group.nodes), group.stiffness) for group in acting])
         target = np.concatenate([self._target(group, time + dt) for group in acting])
-        ahead = self.trial(dt, push)
-        free = self._at(ahead.frame, ahead.q, self.local[nodes], self.shapes[nodes].reshape(3 * len(nodes), -1))
-        J = self._levers(self.local[nodes], self.shapes[nodes]).reshape(3 * len(nodes), -1)
+        held = self._nodes.part(nodes)
+        free = held.at(self.trial(dt, push))
+        J = held.levers(self.keep()).reshape(3 * len(nodes), -1)
         pulled = np.repeat(stiffness, 3)[:, None] * J
         return np.linalg.solve(
             np.eye(len(push)) + pulled.T @ J @ self.compliance(dt), pulled.T @ (target - free).ravel()

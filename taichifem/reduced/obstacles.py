@@ -5,6 +5,7 @@ import numpy as np
 from taichifem import runtime
 from taichifem.description import Scene
 from taichifem.formulas import collision
+from taichifem.reduced.vectors import cross
 from taichifem.runtime import ti
 from taichifem.surroundings import collider_table
 
@@ -13,6 +14,8 @@ _array = ti.types.ndarray
 
 @ti.kernel
 def _gaps(table: _array(), before: _array(), after: _array(), gaps: _array(), normals: _array()):
+    # A few thousand points at most: to wake threads up takes longer.
+    ti.loop_config(serialize=True)
     for i, c in ti.ndrange(before.shape[0], table.shape[0]):
         start, end = ti.Vector.zero(ti.f64, 3), ti.Vector.zero(ti.f64, 3)
         size, normal = ti.Vector.zero(ti.f64, 3), ti.Vector.zero(ti.f64, 3)
@@ -50,20 +53,23 @@ class Obstacles:
         """Where they stand at `time` [s], the end of a step of dt [s] (`surroundings.collider_table`)."""
         return collider_table(self._scene.colliders, time, dt)
 
-    def near(self, table: np.ndarray, before: np.ndarray, after: np.ndarray, radius: float) -> bool:
-        """May a ball that goes from `before` to `after` (3,) meet a collider on its way? Errs to yes."""
-        way = np.linalg.norm(after - before)
+    def near(self, table: np.ndarray, before: np.ndarray, after: np.ndarray, radius: np.ndarray) -> np.ndarray:
+        """May balls that go from `before` to `after` (n,3) meet a collider on their way (n,)? Errs to yes.
+
+        radius: theirs (n,) [m].
+        """
+        way = np.linalg.norm(after - before, axis=1)
+        met = np.zeros(len(after), dtype=bool)
         for row in table:
             kind, own = row[0], row[5:8] - row[14:17]
             if kind == collision.PLANE:
                 normal = row[17:26].reshape(3, 3)[:, 2]
-                clear = min((after - row[5:8]) @ normal, (before - row[5:8]) @ normal)
+                clear = np.minimum((after - row[5:8]) @ normal, (before - row[5:8]) @ normal)
             else:
                 size = row[2] if kind == collision.SPHERE else 0.5 * np.linalg.norm(row[2:5])
-                clear = np.linalg.norm(after - row[5:8]) - size - way
-            if clear < radius + np.linalg.norm(own):
-                return True
-        return False
+                clear = np.linalg.norm(after - row[5:8], axis=1) - size - way
+            met |= clear < radius + np.linalg.norm(own)
+        return met
 
     def gaps(self, table: np.ndarray, before: np.ndarray, after: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """Gaps (n,colliders) [m] of points that go from `before` to `after` (n,3), negative inside, and the outward
@@ -78,4 +84,4 @@ class Obstacles:
     def carried(self, table: np.ndarray, which: np.ndarray, points: np.ndarray, dt: float) -> np.ndarray:
         """How far (n,3) [m] the colliders `which` (n,) take points (n,3) along that stick to them, over dt [s]."""
         rows = table[which]
-        return dt * (rows[:, 8:11] + np.cross(rows[:, 11:14], points - rows[:, 5:8]))
+        return dt * (rows[:, 8:11] + cross(rows[:, 11:14], points - rows[:, 5:8]))

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from functools import partial
+
 import numpy as np
 
 from taichifem.reduced.contact import contact_forces, frames_of, stopping_impulses
@@ -14,6 +16,9 @@ CELLS = 6
 
 PRECISE = 1e-5
 """Error of a gap [m] that another pass is made for."""
+
+
+_TOUCHED = ("touched", "against", "pushed")
 
 
 def spread_out(points: np.ndarray, gaps: np.ndarray, most: int) -> np.ndarray:
@@ -36,7 +41,20 @@ class Touch:
 
     def __init__(self) -> None:
         self.dissipated = 0.0
+        self._near, self._close = np.zeros(0, dtype=int), None
         self._clear()
+
+    def state(self) -> dict[str, np.ndarray]:
+        """What the next step depends on: it begins with the contacts of this one."""
+        held = self.forces[:, 0] > 0
+        touched = self._near[self.points[held]], self.which[held], self.forces[held]
+        return {"dissipated": np.array(self.dissipated)} | dict(zip(_TOUCHED, touched, strict=True))
+
+    def set_state(self, state: dict[str, np.ndarray]) -> None:
+        """The inverse of `state`."""
+        self.dissipated = float(state["dissipated"])
+        self._near, self.which, self.forces = (state[name].copy() for name in _TOUCHED)
+        self.points, self._close = np.arange(len(self._near)), None
 
     def _clear(self) -> None:
         self.points, self.which = np.zeros(0, dtype=int), np.zeros(0, dtype=int)
@@ -52,30 +70,54 @@ class Touch:
 
         body: see `ModalBody`.  push: generalised forces (r,) without contact.
         """
+        held = self.forces[:, 0] > 0
+        last = self._near[self.points[held]], self.which[held], self.forces[held]
         self._clear()
         if not obstacles.count:
             return push
         self._table, self._obstacles = obstacles.table(time + dt, dt), obstacles
-        alone = body.trial(dt, push)
-        if not obstacles.near(self._table, *body.ball(alone)):
+        now, alone = body.keep(), body.trial(dt, push)
+        near = body.skin.near(now, alone, partial(obstacles.near, self._table))
+        if not len(near):
             return push
-        before = body.skin()
+        if not np.array_equal(near, self._near) or self._close is None:
+            self._near, self._close = near, body.skin.all.part(near, body.skin.all.rows.dtype)
+        before = self._close.at(now)
         contact, compliance, reached = np.zeros_like(push), body.compliance(dt), alone
-        for _ in range(PASSES):
-            after = body.skin(reached)
-            gaps, normals = obstacles.gaps(self._table, before, after)
-            if not self._take(after, gaps, normals):
-                break
+        after = self._begin_with(*last, before, alone)
+        for k in range(PASSES):
+            if k or not len(self.points):
+                everywhere = self._close.at(reached)
+                if not self._take(everywhere, *obstacles.gaps(self._table, before, everywhere)):
+                    break
+                after = everywhere[self.points]
             # How contact turns the frame is linear to first order only: correct by where it really leads.
-            contact = self._forces(body, before, after, compliance, dt, time)
+            acted = self.forces if reached is not alone else np.zeros_like(self.forces)
+            contact = self._forces(now, before[self.points], after, acted, compliance, dt, time)
             reached = body.trial(dt, push + contact)
         return push + self._paid(body, push, contact, reached, alone, dt)
+
+    def _begin_with(self, points: np.ndarray, which: np.ndarray, forces: np.ndarray, before, alone) -> np.ndarray:
+        """Contacts of the last step, by their numbers among all points, are the first to be looked at in this one:
+        where these points (m,3) would be without them."""
+        at = np.minimum(np.searchsorted(self._near, points), len(self._near) - 1)
+        still = self._near[at] == points
+        points, which, forces = at[still], which[still], forces[still]
+        after = self._close.part(points).at(alone) if len(points) else np.zeros((0, 3))
+        gaps, normals = self._obstacles.gaps(self._table, before[points], after)
+        each = np.arange(len(points))
+        gaps, normals = gaps[each, which], normals[each, which]
+        deep = gaps < 0
+        self.points, self.which, self.forces = points[deep], which[deep], forces[deep]
+        self.frames, self._gaps = frames_of(normals[deep]), gaps[deep]
+        return after[deep]
 
     def _take(self, after: np.ndarray, gaps: np.ndarray, normals: np.ndarray) -> bool:
         """Add the points (n,3) that have gone in; is there anything to be done?"""
         known = np.zeros(gaps.shape, dtype=bool)
         known[self.points, self.which] = True
-        points, which = np.nonzero((gaps < 0) & ~known)
+        deep = -PRECISE if len(self.points) else 0.0
+        points, which = np.nonzero((gaps < deep) & ~known)
         new = spread_out(after[points], gaps[points, which], MOST)
         points, which = points[new], which[new]
         self.points, self.which = np.r_[self.points, points], np.r_[self.which, which]
@@ -84,19 +126,22 @@ class Touch:
         self._gaps = gaps[self.points, self.which]
         return len(points) > 0 or np.abs(self._gaps[self.forces[:, 0] > 0]).max(initial=0.0) > PRECISE
 
-    def _forces(self, body, before, after, compliance, dt, time) -> np.ndarray:
-        """What the contacts known so far do to the coordinates (r,)."""
-        p, at = self.points, np.arange(len(self.points))
-        slip = after[p] - before[p] - self._obstacles.carried(self._table, self.which, before[p], dt)
+    def _forces(self, now, before, after, acted, compliance, dt, time) -> np.ndarray:
+        """What the contacts known so far do to the coordinates (r,).
+
+        before, after: where their points are (m,3) now, and at the end of the step under the forces `acted` (m,3).
+        """
+        at = np.arange(len(self.points))
+        slip = after - before - self._obstacles.carried(self._table, self.which, before, dt)
         end = np.einsum("mab,mb->ma", self.frames, slip)
         end[:, 0] = self._gaps
-        J = np.einsum("mab,mbr->mar", self.frames, body.levers(p)).reshape(3 * len(p), -1)
+        J = (self.frames @ self._close.part(self.points).levers(now)).reshape(3 * len(at), -1)
         answer = J @ compliance @ J.T
-        free = end - (answer @ self.forces.ravel()).reshape(-1, 3)
+        free = end - (answer @ acted.ravel()).reshape(-1, 3)
         friction = self._obstacles.friction[self.which]
         self.forces = contact_forces(answer, free, friction, self.forces)
         # What is inside already is pushed out if contact has taken enough energy to pay for it.
-        begin = self._obstacles.gaps(self._obstacles.table(time, dt), before[p], before[p])[0][at, self.which]
+        begin = self._obstacles.gaps(self._obstacles.table(time, dt), before, before)[0][at, self.which]
         begin = np.minimum(begin, 0.0)
         flat = self.forces.ravel()
         if flat @ (answer @ flat + free.ravel()) - self.forces[:, 0] @ begin > self.dissipated:
@@ -121,10 +166,11 @@ class Touch:
         held = self.forces[:, 0] > 0
         if not held.any():
             return
-        points, which, frames = self.points[held], self.which[held], self.frames[held]
-        places, velocity = body.velocities_of(points)
+        which, frames = self.which[held], self.frames[held]
+        now, points = body.keep(), self._close.part(self.points[held])
+        places, velocity = points.at(now), points.velocities(now)
         relative = velocity - self._obstacles.carried(self._table, which, places, dt) / dt
-        J = np.einsum("mab,mbr->mar", frames, body.levers(points)).reshape(3 * len(points), -1)
+        J = (frames @ points.levers(now)).reshape(3 * len(which), -1)
         answer = J @ body.mobility() @ J.T
         seen = np.einsum("mab,mb->ma", frames, relative)
         # Friction has acted during the step: only what it has left may act now.

@@ -127,6 +127,22 @@ def test_without_a_video_nothing_is_drawn(tiny, monkeypatch):
     assert [file.name for file in tiny.parent.iterdir()] == ["tiny.toml"]
 
 
+def test_reduced_models_stand_beside_the_full_one(tiny, tmp_path):
+    """Condensation leaves nothing out: it loses as much energy as the full model does."""
+    file = tmp_path / "figures.json"
+    result = call(
+        "compare", tiny, "--vary", "model=linear,modal,condensed", "--set", "body.0.material.modes=6", "--json", file
+    )
+    assert result.exit_code == 0, result.output
+    full, modal, condensed = json.loads(file.read_text())["rows"]
+    assert [row["choice"] for row in (full, modal, condensed)] == [
+        f"model = {m}" for m in ("linear", "modal", "condensed")
+    ]
+    for part in ("start_J", "end_J"):
+        assert condensed["energy"][part] == pytest.approx(full["energy"][part], rel=1e-2)
+    assert modal["steps"] == full["steps"] and modal["iterations"]["max"] == 0 < full["iterations"]["max"]
+
+
 def test_ctrl_c_ends_with_the_table(tiny, monkeypatch):
     def interrupted(*_):
         raise KeyboardInterrupt

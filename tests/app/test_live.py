@@ -37,3 +37,8 @@ def test_unknown_scenes_and_static_ones_are_refused(tiny):
 def test_interactions_and_a_checkpoint_exclude_each_other(tiny):
     assert_refused(call("run", tiny, "--replay", "a.json", "--resume", "b.npz"), "--resume and --replay")
     assert_refused(call("run", tiny, "--replay", "a.json"), "a.json: cannot be read")
+
+
+def test_reduced_bodies_are_refused_with_what_to_use(tiny):
+    modal = call("live", tiny, "--no-browser", "--port", 0, "--set", "body.0.material.model=modal")
+    assert_refused(modal, "'modal' cannot be taken hold of", "body.0.material.model=linear")
