@@ -33,7 +33,7 @@ class Surface:
 
     def shows(self, frame: Frame) -> bool:
         """Is it the surface of this frame, too?"""
-        return self.of.shape == frame.triangles.shape and np.array_equal(self.of, frame.triangles)
+        return self.of is frame.triangles or np.array_equal(self.of, frame.triangles)
 
 
 def smoothing(points: np.ndarray, triangles: np.ndarray) -> np.ndarray:

@@ -176,7 +176,7 @@ class Session:
     def _topology(self, frame: Frame) -> bytes | None:
         """The surface as bytes, if it or its colours are not those that were sent last."""
         same = self._surface is not None and self._surface.shows(frame)
-        if same and np.array_equal(frame.colors, self._colors):
+        if same and (frame.colors is self._colors or np.array_equal(frame.colors, self._colors)):
             return None
         if not same:
             self._surface = messages.Surface(frame)
