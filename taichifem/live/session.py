@@ -266,6 +266,10 @@ class Session:
         self.diverged, self._panel, self._due = False, True, time.perf_counter()
         self._meter.begin()
 
+    def _ask_mark(self, message: dict) -> None:
+        """Say that all that was asked for before is done, and which update is the first to show it."""
+        self.out.tell("mark", name=str(message.get("name"))[:100], update=self._number + 1)
+
     def _ask_camera(self, message: dict) -> None:
         eye, target = (check.vector(name, message.get(name)) for name in ("eye", "target"))
         self.camera = Camera(eye=eye, target=target, fov=check.number("fov", message.get("fov")))
