@@ -65,13 +65,13 @@ class Session:
         solids = Solids(self._frame())
         seen = frame_points(solids.subject(), scene.camera, (1280, 720))
         self.camera = Camera(eye=tuple(seen.eye.tolist()), target=tuple(seen.target.tolist()), fov=scene.camera.fov)
-        extent = float(np.linalg.norm(solids.high - solids.low))
+        self.extent = float(np.linalg.norm(solids.high - solids.low))
         self.out.tell(
             "hello",
             name=scene.name,
             description=scene.description,
             camera={"eye": self.camera.eye, "target": self.camera.target, "fov": self.camera.fov},
-            extent=extent,
+            extent=self.extent,
             map=list(VIRIDIS),
             elements="triangles" if self.stage.simulation.dimension == 2 else "tetrahedra",
         )

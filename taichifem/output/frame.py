@@ -51,6 +51,7 @@ class Frame:
 
     points: np.ndarray
     triangles: np.ndarray
+    nodes: np.ndarray | None = None
     colors: np.ndarray | None = None
     values: np.ndarray | None = None
     value_range: tuple[float, float] = (0.0, 1.0)
@@ -155,6 +156,7 @@ class FrameBuilder:
         return Frame(
             points=np.ascontiguousarray(seen.follow(np.asarray(simulation.positions)), np.float32),
             triangles=seen.triangles,
+            nodes=seen.nodes,
             colors=self._colors(simulation, view, seen),
             values=values,
             value_range=self._range(values, view.range),

@@ -16,12 +16,14 @@ from taichifem.mesh.embedded import Embedding, barycentric, closest_point, embed
 class Seen:
     """Triangles (k,3) int32 of nodes, which come first, and of points that ride in elements.
 
-    riders: shares (p,n) of the nodes in those points, or None.  bodies, pieces, cracked: of each triangle (k,).
+    riders: shares (p,n) of the nodes in those points, or None.  nodes (n+p,): the node that moves most like each point,
+    or None where all are nodes.  bodies, pieces, cracked: of each triangle (k,).
     colors (k,3) sRGB of its own, NaN where the surface has none.
     """
 
     triangles: np.ndarray
     riders: csr_array | None
+    nodes: np.ndarray | None
     bodies: np.ndarray
     pieces: np.ndarray
     cracked: np.ndarray
@@ -78,19 +80,20 @@ class Skin:
                 elements.append(element), weights.append(weight)
                 first += len(element)
         riding = Embedding(np.concatenate(elements), np.concatenate(weights))
-        riders = riding.matrix(cells, len(simulation.rest_positions))
+        n = len(simulation.rest_positions)
+        riders, main = riding.matrix(cells, n), riding.weights.argmax(axis=1)
+        nodes = np.concatenate([np.arange(n), cells[riding.element, main]])
         columns = (np.concatenate(column) for column in zip(*parts, strict=True))
         triangles, bodies, pieces, cracked = columns
-        return Seen(triangles.astype(np.int32), riders, bodies, pieces, cracked, np.concatenate(colors))
+        return Seen(triangles.astype(np.int32), riders, nodes, bodies, pieces, cracked, np.concatenate(colors))
 
 
 def _plain(simulation: Any, with_pieces: bool) -> Seen:
     triangles = np.asarray(simulation.surface, np.int32)
     colors = np.full((len(triangles), 3), np.nan)
     pieces = simulation.surface_pieces if with_pieces else np.zeros(len(triangles), dtype=int)
-    return Seen(
-        triangles, None, np.asarray(simulation.surface_bodies), pieces, np.asarray(simulation.crack_faces), colors
-    )
+    bodies, cracked = np.asarray(simulation.surface_bodies), np.asarray(simulation.crack_faces)
+    return Seen(triangles, None, None, bodies, pieces, cracked, colors)
 
 
 def _riders(simulation: Any) -> list[_Rider]:
