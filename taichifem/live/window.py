@@ -6,6 +6,7 @@ import json
 import math
 import os
 import sys
+import textwrap
 from dataclasses import replace
 from typing import Any
 
@@ -26,6 +27,9 @@ from taichifem.runtime import ti
 
 SIZE = (1280, 720)
 BROWSER = "leave --window out to use the browser"
+WIDTH = 34
+"""Letters in a line of the panel."""
+
 KNOB = 0.012
 """Size of the spheres that show what is held, of the distance to what is looked at."""
 
@@ -114,8 +118,10 @@ class Window:
             for name in ASKS:
                 if gui.button(name):
                     self._send(asking(name))
-            for _, text in self._session.out.notices[-2:]:
-                gui.text(json.loads(text)["text"][:60])
+            out = self._session.out
+            told = sorted((*out.notices, *(entry for kind, entry in out.texts.items() if kind == "command")))
+            for _, text in told[-2:]:
+                gui.text(textwrap.fill(json.loads(text)["text"], WIDTH))
         with gui.sub_window("parameters", 0.75, 0.0, 0.25, 1.0):
             stage = self._session.stage
             for group in panel(stage.scene, stage.tools):

@@ -184,7 +184,9 @@ def test_buttons_and_keys_ask_and_cut_gravity(window):
     assert stage.scene.gravity == (0.0, 0.0, 0.0)
     go(window, pressed=["g"])
     assert stage.scene.gravity == (0.0, 0.0, -9.81)
+    go(window, clicked={"command"})
     go(window, clicked={"keep"})
+    assert any("taichifem run bar.toml" in words for words in window._renderer.gui.said)
     go(window, clicked={"step"})
     go(window, clicked={"back"})
     assert stage.simulation.step_count == 0
