@@ -81,33 +81,6 @@ def test_pieces_that_have_just_split_feel_nothing():
     assert abs(simulation.positions - simulation.rest_positions).max() < 1e-6
 
 
-def test_a_body_made_whole_again_forgets_how_its_pieces_met():
-    material = tf.Material(youngs=1e6, poisson=0.3, fracture=tf.Fracture(toughness=1e9))
-    body = tf.Body(mesh=CUBE, material=material, spin=(0, 90, 0))
-    simulation = tf.Simulation(tf.Scene(bodies=[body], gravity=(0, 0, 0)))
-    whole, undisturbed = simulation.snapshot(), []
-    for _ in range(5):
-        simulation.step()
-        undisturbed.append(simulation.positions)
-    simulation.restore(*whole)
-    rng = np.random.default_rng(0)
-    for k in range(30):
-        tear(simulation, rng.permutation(len(CUBE.cells)), rng.normal(size=3), seed=k)
-    outward = simulation.rest_positions - simulation.rest_positions.mean(axis=0)
-    for speed in [5.0] * 5 + [-5.0] * 20:  # they have to part before they can meet
-        simulation.set_velocities(speed * outward)
-        simulation.step()
-        if simulation.meetings:
-            break
-    assert simulation.meetings > 0
-    simulation.restore(*whole)
-    assert simulation.meetings == 0 and simulation.piece_count == 1
-    for there in undisturbed:
-        simulation.step()
-        np.testing.assert_array_equal(simulation.positions, there)
-        assert simulation.report.converged and simulation.meetings == 0
-
-
 def test_without_contact_bodies_pass_through_each_other():
     bodies = [
         tf.Body(mesh=CUBE, material=SOLID, velocity=(5, 0, 0)),
