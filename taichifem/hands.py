@@ -16,7 +16,7 @@ ROOM = 224
 class Hand:
     """Holds nodes at targets: by an implicit spring each, or firmly.
 
-    nodes (k,): in the order of the scene; copies that fracture makes of them go free.
+    nodes (k,): in the order of the scene. Of the copies that fracture makes of a node, the heaviest is held on.
     start, targets (k,3): where the nodes were when it took hold, and where it wants them [m].
     stiffness: of the whole hand [N/m]; None holds firmly, as a pin does.
     """
@@ -77,6 +77,17 @@ class Hands:
         """Pull with `stiffness` [N/m] from the next step on."""
         self.changed = self.changed or stiffness != hand.stiffness
         hand.stiffness = stiffness
+
+    def follow(self, parent: np.ndarray, masses: np.ndarray) -> None:
+        """Go on after nodes were split: hold the heaviest copy of each, so that no splinter is left in the hand.
+
+        parent (n,): the node before that each is, or is a copy of.  masses (n,) [kg].
+        """
+        order = np.lexsort((-np.arange(len(parent)), masses, parent))  # of equal ones the first comes last
+        last = np.searchsorted(parent[order], np.arange(parent.max() + 1), side="right") - 1
+        for hand in self._all:
+            hand.nodes = order[last[hand.nodes]]
+        self.changed = self.changed or bool(self._all)
 
     def rows(self, number: np.ndarray, first: int) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
         """What they hold (k,5), what they pull (l,2) and how stiffly (l,) [N/m], as `transfer.fill_groups` takes it.

@@ -77,6 +77,10 @@ class InteractiveBodies(MeetingBodies):
         away /= np.maximum(np.linalg.norm(away, axis=1, keepdims=True), 1e-12)
         return -(pressed[met, None] * away).sum(axis=0, dtype=float)
 
+    def _reshape(self, parent: np.ndarray) -> None:
+        super()._reshape(parent)
+        self._hands.follow(parent, self.masses)
+
     def _around(self, node: int, radius: float) -> np.ndarray:
         """Nodes of the body of `node` within `radius` [m] of it at rest, the nearest ones."""
         if check.whole("node", node, at_least=0) >= self._counts.nodes:

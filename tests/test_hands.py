@@ -2,6 +2,7 @@
 
 import numpy as np
 import pytest
+from mechanics import tear
 
 import taichifem as tf
 from taichifem.hands import ROOM
@@ -107,3 +108,25 @@ def test_gravity_and_time_step_change_while_it_runs(simulation):
         simulation.step()
     simulation.adjust(gravity=(0.0, 0.0, 0.0), substeps=None)
     assert simulation.dt == pytest.approx(1 / 60) and simulation.frame == 1
+
+
+def test_a_hand_keeps_the_heaviest_copy_of_what_fracture_splits():
+    bar = tf.TetMesh.bar(size=(0.6, 0.3, 0.3), cells=(6, 3, 3))
+    body = tf.Body(mesh=bar, material=tf.Material(youngs=1e5, fracture=tf.Fracture(toughness=1e9)))
+    simulation = tf.Simulation(tf.Scene(bodies=[body], gravity=(0, 0, 0)))
+    hands = [simulation.grab(tip(simulation), radius=0.15, stiffness=k) for k in (800.0, None)]
+    before = hands[0].nodes
+    around = np.flatnonzero(np.isin(simulation.cells, before).any(axis=1))
+    tear(simulation, np.random.default_rng(1).permutation(around), (1.0, 0.4, 0.2), seed=1)
+    origins, masses = simulation.origins, simulation.masses
+    assert np.isin(origins, before).sum() > len(before)
+    for hand in hands:
+        np.testing.assert_array_equal(origins[hand.nodes], before)
+        heaviest = [masses[origins == node].max() for node in before]
+        np.testing.assert_allclose(masses[hand.nodes], heaviest, rtol=1e-6)
+    assert (hands[0].nodes != before).any(), "of some nodes a copy is heavier"
+    hands[1].move((0.0, 0.0, 0.1))
+    there = simulation.positions[before]
+    simulation.step()
+    moved = simulation.positions[hands[1].nodes] - there
+    np.testing.assert_allclose(moved, np.tile((0, 0, 0.1), (len(before), 1)), atol=1e-6)

@@ -20,20 +20,22 @@ CREASE = np.cos(np.radians(40.0))
 class Surface:
     """What of a frame is on the surface. Changes when bodies break.
 
-    nodes (n,): those of the scene that are on it.  triangles (k,3): as numbers of these.
+    points (n,): those of the frame that are on it.  nodes (n,): of the scene, by which one takes hold of them.
+    triangles (k,3): as numbers of these.
     corners (k,3): corners with the same number share a normal; there are `normals` of them.
     """
 
     def __init__(self, frame: Frame) -> None:
         self.of = frame.triangles
-        self.nodes, local = np.unique(frame.triangles, return_inverse=True)
+        self.points, local = np.unique(frame.triangles, return_inverse=True)
+        self.nodes = self.points if frame.nodes is None else frame.nodes[self.points]
         self.triangles = local.reshape(-1, 3)
-        self.corners = smoothing(np.asarray(frame.points, float)[self.nodes], self.triangles)
+        self.corners = smoothing(np.asarray(frame.points, float)[self.points], self.triangles)
         self.normals = int(self.corners.max(initial=0)) + 1
 
     def shows(self, frame: Frame) -> bool:
         """Is it the surface of this frame, too?"""
-        return self.of.shape == frame.triangles.shape and np.array_equal(self.of, frame.triangles)
+        return self.of is frame.triangles or np.array_equal(self.of, frame.triangles)
 
 
 def smoothing(points: np.ndarray, triangles: np.ndarray) -> np.ndarray:
@@ -84,12 +86,12 @@ def update(frame: Frame, surface: Surface, *, version: int, number: int, time: f
     high end of the colour bar, 0).  colliders: rows of R and c, the kind as in KINDS, and the size [m].
     hands: where they hold, where they want that, force [N], 1 if firm.
     """
-    points = np.ascontiguousarray(frame.points[surface.nodes], "<f4")
+    points = np.ascontiguousarray(frame.points[surface.points], "<f4")
     colliders = np.array([_collider(shape) for shape in frame.colliders], "<f4").reshape(-1, 16)
     shades = np.zeros(0, np.uint8)
     low, high = frame.value_range
     if frame.values is not None:
-        share = (frame.values[surface.nodes] - low) / max(high - low, 1e-30)
+        share = (frame.values[surface.points] - low) / max(high - low, 1e-30)
         shades = np.rint(255 * np.clip(share, 0, 1)).astype(np.uint8)
     head = np.array([UPDATE, version, number, len(points), len(colliders), len(hands), len(shades) > 0, 0], "<u4")
     figures = np.array([time, low, high, 0], "<f4")

@@ -12,7 +12,7 @@ from taichifem.output.frame import Frame
 
 @dataclass(frozen=True)
 class Hit:
-    """A point (3,) [m] of the surface, its depth along the view [m], and the node nearest to it."""
+    """A point (3,) [m] of the surface, its depth along the view [m], and the node to take it by."""
 
     point: np.ndarray
     depth: float
@@ -42,4 +42,5 @@ def pick(frame: Frame, viewpoint: Viewpoint, along: np.ndarray) -> Hit | None:
     k = int(np.argmin(np.where(met, distance, np.inf)))
     corner = int(np.argmax([1 - u[k] - v[k], u[k], v[k]]))
     depth = float(distance[k] * (along @ viewpoint.forward))
-    return Hit(viewpoint.eye + distance[k] * along, depth, int(frame.triangles[k, corner]))
+    point = int(frame.triangles[k, corner])
+    return Hit(viewpoint.eye + distance[k] * along, depth, point if frame.nodes is None else int(frame.nodes[point]))

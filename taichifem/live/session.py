@@ -65,13 +65,13 @@ class Session:
         solids = Solids(self._frame())
         seen = frame_points(solids.subject(), scene.camera, (1280, 720))
         self.camera = Camera(eye=tuple(seen.eye.tolist()), target=tuple(seen.target.tolist()), fov=scene.camera.fov)
-        extent = float(np.linalg.norm(solids.high - solids.low))
+        self.extent = float(np.linalg.norm(solids.high - solids.low))
         self.out.tell(
             "hello",
             name=scene.name,
             description=scene.description,
             camera={"eye": self.camera.eye, "target": self.camera.target, "fov": self.camera.fov},
-            extent=extent,
+            extent=self.extent,
             map=list(VIRIDIS),
             elements="triangles" if self.stage.simulation.dimension == 2 else "tetrahedra",
         )
@@ -176,7 +176,7 @@ class Session:
     def _topology(self, frame: Frame) -> bytes | None:
         """The surface as bytes, if it or its colours are not those that were sent last."""
         same = self._surface is not None and self._surface.shows(frame)
-        if same and np.array_equal(frame.colors, self._colors):
+        if same and (frame.colors is self._colors or np.array_equal(frame.colors, self._colors)):
             return None
         if not same:
             self._surface = messages.Surface(frame)
@@ -265,6 +265,10 @@ class Session:
     def _again(self) -> None:
         self.diverged, self._panel, self._due = False, True, time.perf_counter()
         self._meter.begin()
+
+    def _ask_mark(self, message: dict) -> None:
+        """Say that all that was asked for before is done, and which update is the first to show it."""
+        self.out.tell("mark", name=str(message.get("name"))[:100], update=self._number + 1)
 
     def _ask_camera(self, message: dict) -> None:
         eye, target = (check.vector(name, message.get(name)) for name in ("eye", "target"))

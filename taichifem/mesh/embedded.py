@@ -6,6 +6,7 @@ from dataclasses import dataclass
 from os import PathLike
 
 import numpy as np
+from scipy.sparse import csr_array
 from scipy.spatial import cKDTree
 
 from taichifem.errors import InputError
@@ -57,6 +58,12 @@ class Embedding:
     def points(self, positions: np.ndarray, cells: np.ndarray) -> np.ndarray:
         """The points (p,3) for node positions (n,3) (or any node values) and elements (m,4)."""
         return np.einsum("pa,pab->pb", self.weights, positions[cells[self.element]])
+
+    def matrix(self, cells: np.ndarray, nodes: int) -> csr_array:
+        """The same as a sparse matrix (p,nodes): for meshes that are asked again and again."""
+        p, corners = self.weights.shape
+        starts = corners * np.arange(p + 1)
+        return csr_array((self.weights.ravel(), cells[self.element].ravel(), starts), shape=(p, nodes))
 
 
 def embed(points: np.ndarray, nodes: np.ndarray, cells: np.ndarray, *, reach: float = REACH) -> Embedding:

@@ -103,7 +103,7 @@ def _surface(simulation: Any) -> meshio.Mesh:
     """The surface that is seen, with only its own points, in the 32 bits that viewers of these formats read."""
     seen = Skin().of(simulation)
     nodes, triangles = np.unique(seen.triangles, return_inverse=True)
-    points = seen.follow(simulation.positions, simulation.cells)[nodes].astype(np.float32)
+    points = seen.follow(simulation.positions)[nodes].astype(np.float32)
     return meshio.Mesh(points, [("triangle", triangles.reshape(-1, 3).astype(np.int32))])
 
 

@@ -8,6 +8,7 @@ from dataclasses import dataclass, field
 from typing import Any
 
 import numpy as np
+from scipy.sparse import csr_array
 
 from taichifem.description.colliders import BoxCollider, Collider, PlaneCollider
 from taichifem.description.motion import rotation_matrix
@@ -50,6 +51,7 @@ class Frame:
 
     points: np.ndarray
     triangles: np.ndarray
+    nodes: np.ndarray | None = None
     colors: np.ndarray | None = None
     values: np.ndarray | None = None
     value_range: tuple[float, float] = (0.0, 1.0)
@@ -138,21 +140,24 @@ class FrameBuilder:
 
     def __init__(self) -> None:
         self._top = 0.0
-        self._cells = np.zeros((0, 4), int)
-        self._around = np.ones(0)
         self.skin = Skin()
+        self._seen: Seen | None = None
+        self._around: csr_array | None = None
+        self._painted: tuple[Any, ...] = ()
 
     def build(self, simulation: Any) -> Frame:
         """The frame of `simulation` now."""
-        view = simulation.scene.view
+        view, seen = simulation.scene.view, self.skin.of(simulation)
+        if seen is not self._seen:
+            self._seen, self._around = seen, None
         values, label, unit = self._values(simulation, view.color)
-        seen, cells = self.skin.of(simulation), np.asarray(simulation.cells)
         if values is not None:
-            values = seen.follow(values, cells).astype(np.float32)
+            values = seen.follow(values).astype(np.float32)
         return Frame(
-            points=np.ascontiguousarray(seen.follow(np.asarray(simulation.positions), cells), np.float32),
-            triangles=np.ascontiguousarray(seen.triangles, np.int32),
-            colors=_surface_colors(seen, simulation, view),
+            points=np.ascontiguousarray(seen.follow(np.asarray(simulation.positions)), np.float32),
+            triangles=seen.triangles,
+            nodes=seen.nodes,
+            colors=self._colors(simulation, view, seen),
             values=values,
             value_range=self._range(values, view.range),
             value_label=label,
@@ -162,29 +167,33 @@ class FrameBuilder:
             hud=hud_lines(simulation) if view.hud else (),
         )
 
+    def _colors(self, simulation: Any, view: View, seen: Seen) -> np.ndarray:
+        """Of the triangles; the same array as long as nothing changes them."""
+        what = seen, view.color == "piece", view.colors
+        if not self._painted or self._painted[0] is not seen or self._painted[1:3] != what[1:]:
+            self._painted = *what, _surface_colors(seen, simulation, view)
+        return self._painted[3]
+
     def _values(self, simulation: Any, what: str) -> tuple[np.ndarray | None, str, str]:
         if what == "von-mises":
-            stress = np.asarray(simulation.von_mises(), float)
-            stress = self._to_nodes(np.asarray(simulation.cells), stress, len(simulation.positions))
-            return stress.astype(np.float32), "von Mises stress", "Pa"
+            return self._to_nodes(simulation, simulation.von_mises()), "von Mises stress", "Pa"
         if what == "plastic-strain":
-            strain = simulation.equivalent_plastic_strain()
-            strain = self._to_nodes(np.asarray(simulation.cells), strain, len(simulation.positions))
-            return strain.astype(np.float32), "plastic strain", ""
+            return self._to_nodes(simulation, simulation.equivalent_plastic_strain()), "plastic strain", ""
         if what == "displacement":
             moved = np.asarray(simulation.positions) - np.asarray(simulation.rest_positions)
-            return np.linalg.norm(moved, axis=1).astype(np.float32), "displacement", "m"
+            return np.linalg.norm(moved, axis=1), "displacement", "m"
         if what == "speed":
-            return np.linalg.norm(simulation.velocities, axis=1).astype(np.float32), "speed", "m/s"
+            return np.linalg.norm(simulation.velocities, axis=1), "speed", "m/s"
         return None, "", ""
 
-    def _to_nodes(self, cells: np.ndarray, values: np.ndarray, nodes: int) -> np.ndarray:
-        """Mean (nodes,) of the values (m,) of the elements around each node."""
-        if len(self._around) != nodes or not np.array_equal(cells, self._cells):
-            self._cells = cells.copy()
-            self._around = np.maximum(np.bincount(cells.ravel(), minlength=nodes), 1)
-        sums = np.bincount(cells.ravel(), np.repeat(values, cells.shape[1]), minlength=nodes)
-        return sums / self._around
+    def _to_nodes(self, simulation: Any, values: np.ndarray) -> np.ndarray:
+        """Mean of the values (m,) of the elements around each node (n,); those without any have 0."""
+        if self._around is None:
+            cells, nodes = np.asarray(simulation.cells), len(simulation.rest_positions)
+            around = np.maximum(np.bincount(cells.ravel(), minlength=nodes), 1)
+            elements = np.repeat(np.arange(len(cells)), cells.shape[1])
+            self._around = csr_array((1 / around[cells.ravel()], (cells.ravel(), elements)), (nodes, len(cells)))
+        return self._around @ np.asarray(values, float)
 
     def _range(self, values: np.ndarray | None, given: tuple[float, float] | None) -> tuple[float, float]:
         if given is not None:

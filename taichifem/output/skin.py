@@ -6,6 +6,7 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
+from scipy.sparse import csr_array
 
 from taichifem.mesh.connectivity import boundary_faces
 from taichifem.mesh.embedded import Embedding, barycentric, closest_point, embed, winding_number
@@ -13,43 +14,45 @@ from taichifem.mesh.embedded import Embedding, barycentric, closest_point, embed
 
 @dataclass(frozen=True)
 class Seen:
-    """Triangles (k,3) of nodes, which come first, and of points that ride in elements.
+    """Triangles (k,3) int32 of nodes, which come first, and of points that ride in elements.
 
-    riders: where those points lie.  bodies, pieces, cracked: of each triangle (k,).  colors (k,3) sRGB of its own, NaN
-    where the surface has none.
+    riders: shares (p,n) of the nodes in those points, or None.  nodes (n+p,): the node that moves most like each point,
+    or None where all are nodes.  bodies, pieces, cracked: of each triangle (k,).
+    colors (k,3) sRGB of its own, NaN where the surface has none.
     """
 
     triangles: np.ndarray
-    riders: Embedding
+    riders: csr_array | None
+    nodes: np.ndarray | None
     bodies: np.ndarray
     pieces: np.ndarray
     cracked: np.ndarray
     colors: np.ndarray
 
-    def follow(self, values: np.ndarray, cells: np.ndarray) -> np.ndarray:
+    def follow(self, values: np.ndarray) -> np.ndarray:
         """Values of all points, from those of the nodes (n,) or (n,3)."""
-        if not len(self.riders.element):
-            return values
-        columns = values.reshape(len(values), -1)
-        return np.concatenate([columns, self.riders.points(columns, cells)]).reshape(-1, *values.shape[1:])
+        return values if self.riders is None else np.concatenate([values, self.riders @ values])
 
 
 class Skin:
-    """The seen surface of one simulation; worked out again when its mesh changes."""
+    """The seen surface of one simulation; worked out again when its mesh changes, which has another surface then."""
 
     def __init__(self) -> None:
-        self._cells: np.ndarray | None = None
+        self._surface: np.ndarray | None = None
+        self._with_pieces = False
         self._riding: list[_Rider] | None = None
 
     def of(self, simulation: Any) -> Seen:
-        """What is seen of `simulation` now."""
-        cells = np.asarray(simulation.cells)
-        if self._riding is None:
-            self._riding = _riders(simulation)
-        if not self._riding:
-            return _plain(simulation)
-        if self._cells is None or not np.array_equal(cells, self._cells):
-            self._cells, self._seen = cells.copy(), self._work_out(simulation, cells)
+        """What is seen of `simulation` now; the same object as long as that stays."""
+        surface, with_pieces = simulation.surface, simulation.scene.view.color == "piece"
+        if self._surface is not surface or (with_pieces and not self._with_pieces):
+            if self._riding is None:
+                self._riding = _riders(simulation)
+            if self._riding:
+                self._seen = self._work_out(simulation, np.asarray(simulation.cells))
+            else:
+                self._seen = _plain(simulation, with_pieces)
+            self._surface, self._with_pieces = surface, with_pieces or bool(self._riding)
         return self._seen
 
     def _work_out(self, simulation: Any, cells: np.ndarray) -> Seen:
@@ -76,21 +79,21 @@ class Skin:
                 colors.append(np.full((len(triangles), 3), np.nan))
                 elements.append(element), weights.append(weight)
                 first += len(element)
-        riders = Embedding(np.concatenate(elements), np.concatenate(weights))
+        riding = Embedding(np.concatenate(elements), np.concatenate(weights))
+        n = len(simulation.rest_positions)
+        riders, main = riding.matrix(cells, n), riding.weights.argmax(axis=1)
+        nodes = np.concatenate([np.arange(n), cells[riding.element, main]])
         columns = (np.concatenate(column) for column in zip(*parts, strict=True))
         triangles, bodies, pieces, cracked = columns
-        return Seen(triangles.astype(np.int32), riders, bodies, pieces, cracked, np.concatenate(colors))
+        return Seen(triangles.astype(np.int32), riders, nodes, bodies, pieces, cracked, np.concatenate(colors))
 
 
-def _plain(simulation: Any) -> Seen:
-    nobody = Embedding(np.zeros(0, dtype=int), np.zeros((0, 4)))
-    triangles = np.asarray(simulation.surface)
+def _plain(simulation: Any, with_pieces: bool) -> Seen:
+    triangles = np.asarray(simulation.surface, np.int32)
     colors = np.full((len(triangles), 3), np.nan)
-    asked = simulation.scene.view.color == "piece"
-    pieces = simulation.surface_pieces if asked else np.zeros(len(triangles), dtype=int)
-    return Seen(
-        triangles, nobody, np.asarray(simulation.surface_bodies), pieces, np.asarray(simulation.crack_faces), colors
-    )
+    pieces = simulation.surface_pieces if with_pieces else np.zeros(len(triangles), dtype=int)
+    bodies, cracked = np.asarray(simulation.surface_bodies), np.asarray(simulation.crack_faces)
+    return Seen(triangles, None, None, bodies, pieces, cracked, colors)
 
 
 def _riders(simulation: Any) -> list[_Rider]:

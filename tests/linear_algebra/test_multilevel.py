@@ -53,6 +53,7 @@ def test_block_jacobi_gives_the_same_answer_in_more_iterations():
         assert simulation.report.converged
         ends.append(simulation.positions)
         iterations.append(simulation.report.iterations)
+        del simulation  # the next one takes its world, which is compiled
     assert ends[1] == pytest.approx(ends[0], abs=1e-9)
     assert iterations[1] > 4 * iterations[0]
 
@@ -65,6 +66,7 @@ def test_an_operation_a_launch_gives_the_same_answer(monkeypatch):
         simulation = tf.Simulation(tf.Scene(bodies=[bar(), bar(1e4, pins=(), position=(0, 1, 0))]))
         simulation.advance(seconds=0.05)
         ends.append((simulation.positions, simulation.report.iterations))
+        del simulation  # the next one takes its world, which is compiled
     assert ends[0][0] == pytest.approx(ends[1][0], abs=1e-5) and ends[0][1] == ends[1][1]
 
 

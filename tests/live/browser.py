@@ -133,7 +133,9 @@ class Browser:
         self.mouse("mouseReleased", *ends[1])
 
     def picture(self, path=None):
-        """What the page looks like (height,width,3) uint8."""
+        """What the page looks like (height,width,3) uint8, with all that it has drawn until now."""
+        # What a page draws is shown with its next frame, and a slow one is asked for when that has begun.
+        self.value("new Promise((done) => requestAnimationFrame(() => requestAnimationFrame(done)))")
         data = base64.b64decode(self.call("Page.captureScreenshot", format="png")["data"])
         if path is not None:
             Path(path).write_bytes(data)

@@ -9,20 +9,35 @@ import tempfile
 import time
 from pathlib import Path
 
+import meshio
 from browser import GRAPHICS, Browser, chromium
 from serving import Client, Serving
 
+import taichifem as tf
+
 SCENE = """
-name = "slab"
+name = "block"
 [view]
 color = "von-mises"
 [[body]]
-mesh = {{ shape = "bar", size = [2.0, 2.0, 0.05], cells = [{0}, {0}, 1] }}
-material = {{ youngs = 1e5, poisson = 0.3, stiffness_damping = 0.01 }}
+mesh = { shape = "bar", size = [1.0, 0.5, 0.5], cells = [16, 8, 8] }
+material = { youngs = 1e5, poisson = 0.3, stiffness_damping = 0.01 }
+EMBED
 [[body.pin]]
-box = {{ lower = [-1, -1, -1], upper = [1e-6, 3, 3] }}
+box = { lower = [-1, -1, -1], upper = [1e-6, 3, 3] }
 """
 SECONDS = 10.0
+
+
+def block(folder: Path, cells: tuple[int, int, int] | None) -> Path:
+    """A block of 5,120 tetrahedra; with a surface embedded that is that of a block of so many cells."""
+    text, path = SCENE.replace("EMBED", ""), folder / "block.toml"
+    if cells is not None:
+        fine = tf.TetMesh.bar(size=(1.0, 0.5, 0.5), cells=cells)
+        meshio.Mesh(fine.points, [("triangle", fine.surface())]).write(folder / "fine.obj")
+        text = SCENE.replace("EMBED", 'embed = "fine.obj"')
+    path.write_text(text)
+    return path
 
 
 def read(url):
@@ -34,8 +49,9 @@ def read(url):
         wall, count = time.monotonic() - begin, client.updates - updates
         factor, figures = (client.time - at) / wall, client.last["figures"]
         print(
-            f"{figures['elements']} tetrahedra, {figures['ms']:.1f} ms a step: {count / wall:.0f} updates a second, "
-            f"{(client.bytes - size) / count / 1e3:.1f} kB each, {factor:.2f} x real time"
+            f"{figures['elements']:,} tetrahedra, {figures['ms']:.1f} ms a step, {client.triangles:,} triangles: "
+            f"{count / wall:.0f} updates a second, {(client.bytes - size) / count:,.0f} bytes each, "
+            f"{factor:.2f} x real time"
         )
 
 
@@ -51,12 +67,10 @@ def draw(url, graphics):
 
 
 def main():
-    with tempfile.TemporaryDirectory() as folder:
-        for cells in (32, 49):
-            path = Path(folder, "slab.toml")
-            path.write_text(SCENE.format(cells))
-            print(f"{4 * cells * cells + 8 * cells} triangles on the surface")
-            serving = Serving(path, folder)
+    with tempfile.TemporaryDirectory() as name:
+        folder = Path(name)
+        for cells in (None, (45, 23, 22)):
+            serving = Serving(block(folder, cells), folder)
             try:
                 read(serving.url)
                 for graphics in GRAPHICS if chromium() else ():

@@ -63,6 +63,7 @@ class Client:
         self.socket = self.opened.enter_context(made)
         self.last, self.updates, self.bytes, self.notices = {}, 0, 0, []
         self.topology = self.points = None
+        self.triangles = 0
 
     def send(self, **message):
         self.socket.send(json.dumps(message))
@@ -80,6 +81,7 @@ class Client:
         kind, version, number, nodes = np.frombuffer(data, "<u4", 4)
         if kind == 1:
             self.topology = int(version), np.frombuffer(data, "<u4", int(number), 24)
+            self.triangles = int(nodes)
             return "topology", None
         assert self.topology[0] == version
         self.updates += 1

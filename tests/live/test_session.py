@@ -181,8 +181,7 @@ def storm(serving, client, seconds):
     return halted, memory
 
 
-@pytest.mark.slow
-@pytest.mark.parametrize("seconds", [5, 120])
+@pytest.mark.parametrize("seconds", [5, pytest.param(120, marks=pytest.mark.slow)])
 def test_sliders_at_their_ends_in_quick_succession_break_nothing(serving, client, seconds):
     client.until(lambda: "panel" in client.last)
     halted, memory = storm(serving, client, seconds)

@@ -62,7 +62,7 @@ def test_triangles_go_with_the_piece_that_holds_them():
     simulation.advance(seconds=0.5)
     assert simulation.piece_count > 1
     seen = Skin().of(simulation)
-    points = seen.follow(simulation.positions, simulation.cells)
+    points = seen.follow(simulation.positions)
     own = ~seen.cracked
     assert own.sum() == len(BEAR.triangles) and seen.cracked.any()
     edges = points[seen.triangles[own]]
@@ -80,6 +80,6 @@ def test_modal_bodies_touch_with_what_is_embedded():
     simulation = tf.simulate(tf.Scene(bodies=[body], colliders=[tf.PlaneCollider()]))
     simulation.advance(seconds=1.5)
     seen = Skin().of(simulation)
-    height = seen.follow(simulation.positions, simulation.cells)[np.unique(seen.triangles), 2]
+    height = seen.follow(simulation.positions)[np.unique(seen.triangles), 2]
     assert -2e-3 < height.min() < 2e-3
     assert simulation.positions[:, 2].min() < -2e-3

@@ -48,8 +48,10 @@ function connect() {
       return;
     }
     const found = decode(data);
-    if (found.topology) topology = found.topology;
-    else if (found.update.version === topology?.version) news = found.update;
+    if (found.topology) {
+      if (news) send({ drawn: news.number }); // of a surface that is gone: nobody will see it
+      [topology, news] = [found.topology, null];
+    } else if (found.update.version === topology?.version) news = found.update;
   };
 }
 
@@ -98,6 +100,9 @@ const told = {
     state.bar = message;
     at('bar').classList.toggle('on', message.label !== '');
     at('bar-label').textContent = message.label;
+  },
+  mark(message) {
+    state.mark = message;
   },
   hands({ names }) {
     hand.names = names;
@@ -172,7 +177,7 @@ document.addEventListener('keydown', (event) => {
   }
 });
 
-window.taichifem = { state, view, camera, panel, hand };
+window.taichifem = { ask, state, view, camera, panel, hand };
 choose('pull');
 connect();
 requestAnimationFrame(frame);
