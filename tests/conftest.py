@@ -1,10 +1,16 @@
 """Shared by all tests: where reference data lies, and small bodies."""
 
+import os
 from pathlib import Path
 
 import pytest
 
 import taichifem as tf
+from taichifem import runtime
+
+if "PYTEST_XDIST_WORKER" in os.environ:
+    # The workers have a core each: more threads would wait for one another.
+    runtime.start(threads=1)
 
 SHARED = Path(__file__).resolve().parents[2] / "shared"
 

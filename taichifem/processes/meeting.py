@@ -118,7 +118,8 @@ def _look(w: ti.template(), n: ti.i32, m: ti.i32, dt: ti.f64, size: ti.f64):
         for a in range(1, 4):
             low, high = ti.min(low, _corner(w, e, a)), ti.max(high, _corner(w, e, a))
         first, last = ti.floor(low * inverse, ti.i32), ti.floor(high * inverse, ti.i32)
-        if (last - first).max() < 16:
+        # Numbers of cells end somewhere: what is farther away has diverged, and its differences wrap round.
+        if ((high - low) * inverse).max() < 16 and ti.max(-low, high).max() * inverse < 1e9:
             for c in ti.grouped(ti.ndrange((first[0], last[0] + 1), (first[1], last[1] + 1), (first[2], last[2] + 1))):
                 k = _bucket(w, c)
                 there, own = w.bucket_pieces[k], w.piece[e]
