@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from taichifem import transfer
+from taichifem import carrying
 from taichifem.bodies import Bodies
 from taichifem.description import Scene
 from taichifem.errors import InputError
@@ -107,11 +107,11 @@ class BreakingBodies(Bodies):
         """Go on with the elements as they are split; parent (n,): the present node that each is, or is a copy of."""
         w, counts, before = self._world, self._counts, self._layout.node_number
         with self._kernels():
-            state = transfer.read_nodes(w, counts)
+            state = carrying.read_nodes(w, counts)
         self._take(self._split_layout())
         self._fill_topology()
         with self._kernels():
-            transfer.write_nodes(w, counts, state, before[parent[self._layout.node_order]])
+            carrying.write_nodes(w, counts, state, before[parent[self._layout.node_order]])
 
     def _become(self, cells: np.ndarray, origin: np.ndarray, tips: np.ndarray) -> None:
         """Have the elements `cells`, of nodes and copies of the scene's nodes `origin`, everything at rest."""

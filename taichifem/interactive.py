@@ -7,7 +7,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from taichifem import transfer
+from taichifem import carrying, transfer
 from taichifem.description import Collider, Material, check
 from taichifem.errors import InputError
 from taichifem.hands import Hand, Hands
@@ -58,10 +58,10 @@ class InteractiveBodies(MeetingBodies):
         if not kept:
             same = [k < min(len(before), len(colliders)) and before[k] == colliders[k] for k in range(room)]
             with self._kernels():
-                contacts = transfer.read_contacts(self._world, room, self._counts.nodes)
+                contacts = carrying.read_contacts(self._world, room, self._counts.nodes)
                 for values in contacts.values():
                     values[~np.array(same)] = 0
-                transfer.write_contacts(self._world, contacts)
+                carrying.write_contacts(self._world, contacts)
         self.scene = replace(self.scene, colliders=tuple(colliders))
         self._counts.colliders = len(colliders)
         self._surroundings.take(self.scene)
@@ -70,7 +70,7 @@ class InteractiveBodies(MeetingBodies):
         """Force (3,) [N] with which bodies pressed, in the step that ended at `time` [s], on the sphere `collider`."""
         ball, rotation, offset = self._poses(time)[collider]
         with self._kernels():
-            pressed = transfer.read_contacts(self._world, collider + 1, self._counts.nodes)["pressed"][collider]
+            pressed = carrying.read_contacts(self._world, collider + 1, self._counts.nodes)["pressed"][collider]
             x = transfer.read(self._world, self._world.x, self._counts.nodes)
         met = np.flatnonzero(pressed > 0)
         away = x[met] - (rotation @ np.asarray(ball.center) + offset)

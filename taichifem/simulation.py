@@ -9,7 +9,7 @@ from dataclasses import asdict, replace
 
 import numpy as np
 
-from taichifem import checkpoint, transfer
+from taichifem import carrying, checkpoint, transfer
 from taichifem.clock import Clock
 from taichifem.description import Collider, Load, Material, Scene
 from taichifem.errors import Diverged, InputError
@@ -191,7 +191,7 @@ class Simulation(InteractiveBodies):
         self._put_on(share)
         if contacts:
             with self._kernels():
-                transfer.write_contacts(self._world, contacts)
+                carrying.write_contacts(self._world, contacts)
 
     def _put_on(self, share: float) -> None:
         """Put on the part `share` of all loads and motions."""
@@ -299,7 +299,7 @@ class Simulation(InteractiveBodies):
         if not self._counts.colliders:
             return {}
         with self._kernels():
-            return transfer.read_contacts(self._world, self._counts.colliders, self._counts.nodes)
+            return carrying.read_contacts(self._world, self._counts.colliders, self._counts.nodes)
 
     @property
     def stats(self) -> Stats:
@@ -334,7 +334,7 @@ class Simulation(InteractiveBodies):
         w = self._world
         with self._kernels():
             arrays = {name: transfer.read(w, getattr(w, name), count) for name, count in self._state().items()}
-            arrays |= transfer.read_contacts(w, self._counts.colliders, self._counts.nodes)
+            arrays |= carrying.read_contacts(w, self._counts.colliders, self._counts.nodes)
         arrays |= {"cells": self.cells, "origins": self.origins, "tips": self.crack_tips}
         header = {"scene": self._fingerprint(), "clock": asdict(self._clock), "fresh": self._fresh, "due": self._due}
         return arrays, header
@@ -367,7 +367,7 @@ class Simulation(InteractiveBodies):
             for name in self._state():
                 if name in arrays:
                     transfer.write(w, getattr(w, name), arrays[name])
-            transfer.write_contacts(w, arrays)
+            carrying.write_contacts(w, arrays)
         self._clock, self._fresh, self._due = Clock(**header["clock"]), not same or bool(header["fresh"]), header["due"]
         if not same and self._clock.substep == 0:
             self._clock.substeps = self.scene.substeps or 1
