@@ -88,7 +88,8 @@ class Bodies:
         """Give the world what follows from the mesh."""
         layout, pattern = self._layout, self._pattern
         self._counts.nodes, self._counts.elements = len(layout.rest), len(layout.cells)
-        self._counts.meetings = 0  # springs between pieces were those of another mesh
+        # Springs were those of another mesh; what new nodes find in their places is someone else's.
+        self._counts.meetings, self._counts.sprung = 0, True
         with self._kernels():
             transfer.fill_mesh(self._world, layout, pattern)
         self._fill_matrix()

@@ -79,7 +79,9 @@ class InteractiveBodies(MeetingBodies):
 
     def _reshape(self, parent: np.ndarray) -> None:
         super()._reshape(parent)
-        self._hands.follow(parent, self.masses)
+        if len(self._hands):
+            self._fill_table()
+            self._hands.follow(parent, self.masses)
 
     def _around(self, node: int, radius: float) -> np.ndarray:
         """Nodes of the body of `node` within `radius` [m] of it at rest, the nearest ones."""
