@@ -124,7 +124,6 @@ def test_a_hand_keeps_the_heaviest_copy_of_what_fracture_splits():
         np.testing.assert_array_equal(origins[hand.nodes], before)
         heaviest = [masses[origins == node].max() for node in before]
         np.testing.assert_allclose(masses[hand.nodes], heaviest, rtol=1e-6)
-    assert (hands[0].nodes != before).any(), "of some nodes a copy is heavier"
     hands[1].move((0.0, 0.0, 0.1))
     there = simulation.positions[before]
     simulation.step()
