@@ -90,7 +90,7 @@ def _split(precision: str) -> dict:
     from taichifem import Body, Fracture, Material, Motion, Pin, Scene, Simulation, TetMesh
 
     mesh = TetMesh.bar(size=(1.0, 0.25, 0.25), cells=(40, 10, 10))
-    draw = Motion(times=(0, 10), translation=((0, 0, 0), (0, 3.0, 0)))
+    draw = Motion(times=(0, 10), translation=((0, 0, 0), (0.0, 3.0, 0.0)))
     near, far = _ends(0.25, axis=1)
     twins = []
     for toughness in (2e4, 1e30):

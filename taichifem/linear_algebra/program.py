@@ -17,6 +17,9 @@ ADVANCE, LEAVE, RESTRICT, CORRECT, SMOOTH, LAST, PLAIN, DIRECT, PRODUCT = range(
 PLAIN_ROUND = 4
 """Operations of a round without levels: they end every program."""
 
+FEW = 150
+"""Aggregates of a level that is worth a second visit above it."""
+
 ROWS, PARENTS = 16, 8
 """Aggregates that make a piece of work worth sharing out: their rows, or the gathering from those below."""
 
@@ -44,8 +47,9 @@ def write_program(pattern: BlockPattern, aggregates: Aggregates, *, solver: str,
         if level == last:
             items = pieces_of(counts[last], ROWS)
             return [(LAST, last, 1)] if solved else [(LEAVE, last, items), (SMOOTH, last, items)]
-        # Twice, where what is above is not solved exactly: one visit leaves too much of long waves.
-        visits = 1 if level == 0 or (level + 1 == last and solved) else 2
+        # Twice, where what is above is not solved exactly: one visit leaves too much of long waves. But a level of
+        # few aggregates costs as much to wait for as a large one.
+        visits = 1 if level == 0 or (level + 1 == last and solved) or counts[level] < FEW else 2
         items = fine if level == 0 else pieces_of(counts[level], ROWS)
         leave, up = (LEAVE, level, items), pieces_of(counts[level + 1], PARENTS)
         listing = []
