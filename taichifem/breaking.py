@@ -125,4 +125,4 @@ class BreakingBodies(Bodies):
         split = self._splitting
         self._pieces, self._opened = label_pieces(split.cells, len(split.origin)), None
         whole = len(split.origin) == len(self._whole.rest)
-        return self._whole if whole else split_layout(self._whole, split.cells, split.origin)
+        return self._whole if whole else split_layout(self._whole, split.cells, split.origin, self._pieces[2])

@@ -10,18 +10,18 @@ from taichifem.layout import Group, Layout, LoadGroup, place_in
 from taichifem.structure.regrouping import regroup
 
 
-def split_layout(layout: Layout, cells: np.ndarray, origin: np.ndarray) -> Layout:
+def split_layout(layout: Layout, cells: np.ndarray, origin: np.ndarray, piece: np.ndarray) -> Layout:
     """The layout of a scene whose mesh was split, from that of the whole one.
 
     cells (m,d+1): the elements in the scene's order, of nodes and copies of them.  origin (n,): of which node of the
-    scene each is a copy; the first ones are the nodes themselves, copies come last.
+    scene each is a copy; the first ones are the nodes themselves, copies come last.  piece (n,): of each node.
     Pins and handles hold copies too; what pulls or presses is shared out anew, its sum stays. Elements stay where
     they were, and nodes come piece by piece, as their aggregates do.
     """
     old = layout.node_number[origin]
     sorted_by_old = np.argsort(old, kind="stable")
     placed, old = place_in(sorted_by_old)[cells[layout.cell_order]], old[sorted_by_old]
-    aggregates, piece_start = regroup(layout.aggregates, placed, old, layout.node_bodies[old])
+    aggregates, piece_start = regroup(placed, layout.node_bodies[old], piece[sorted_by_old], layout.aggregates.levels)
     node_order, node_from = sorted_by_old[aggregates.order], old[aggregates.order]
     bodies, corners = layout.node_bodies[node_from], place_in(aggregates.order)[placed]
     return replace(

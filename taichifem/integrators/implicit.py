@@ -22,6 +22,7 @@ from taichifem import elements
 from taichifem.integrators.constraints import friction, settle, springs
 from taichifem.integrators.step import Iteration, Step, StepReport
 from taichifem.linear_algebra import assembly, guess, pcg
+from taichifem.linear_algebra.galerkin import relax
 from taichifem.processes import holding
 from taichifem.runtime import ti
 
@@ -199,6 +200,8 @@ def _linearise(step: Step, h: float, inertia: bool, *, first: bool = False, exac
             keep=True,
         )
         _load(w, n, h, damped, *step.gravity)
+        if step.galerkin is not None:
+            relax(w, n, step.counts.elements)
         if not first:
             _forget(w, n)
         holding.hold(w, n, step.counts.held, step.dt, h)

@@ -3,6 +3,7 @@
 Z are the rigid motions of aggregates (see `multilevel`). Every block is gathered in a fixed order: no atomics.
 """
 
+from taichifem import elements
 from taichifem.runtime import ti
 from taichifem.structure.aggregates import Aggregates
 from taichifem.structure.levels import Levels
@@ -13,6 +14,36 @@ FIRM = {"f32": 4e-6, "f64": 1e-12}
 a motion without stiffness."""
 
 
+@ti.kernel
+def relax(w: ti.template(), n: ti.i32, n_elements: ti.i32):
+    """Where nodes would be with strain taken out of the elements around, to `w.relaxed`; spends `w.corner_force`.
+
+    A linear or corotational element does not resist turns of its rest shape, rotated as it is now; the turns of a
+    strained shape it does. So the motions that cost a splinter nothing are those of the former. Each node takes the
+    mean, by volume, of where such elements want it; all others want it where it is.
+    """
+    for e in range(n_elements):
+        now = elements.edges(w.x, w, e)
+        rest = now
+        if w.table[w.material[e]][elements.MODEL] <= elements.QUICK:
+            # The rows of the rotated gradients are the inverse of the rotated rest edges.
+            rest = ti.Matrix.rows([w.h[e * w.corners + 1 + b] for b in ti.static(range(w.d))]).inverse()
+        corner = elements.seen(w.x[w.cell[e][0]], w)
+        for b in ti.static(range(w.d)):
+            for a in ti.static(range(w.d)):
+                corner[a] += (now[a, b] - rest[a, b]) / w.corners
+        w.corner_force[e * w.corners] = corner
+        for b in ti.static(range(w.d)):
+            w.corner_force[e * w.corners + 1 + b] = corner + ti.Vector([rest[a, b] for a in ti.static(range(w.d))])
+    for i in range(n):
+        total, volume = ti.Vector.zero(w.real, w.d), ti.cast(0.0, w.real)
+        for k in range(w.incident_start[i], w.incident_start[i + 1]):
+            e, a = w.incident[k] >> 2, w.incident[k] & 3
+            total += w.volume[e] * w.corner_force[e * w.corners + a]
+            volume += w.volume[e]
+        w.relaxed[i] = elements.lifted(total / volume, w)
+
+
 @ti.func
 def arm(w: ti.template(), n: ti.i32, level: ti.i32, item: ti.i32):
     """From the centre of its aggregate to a node (level 0) or an aggregate, in units of the reach there."""
@@ -20,7 +51,7 @@ def arm(w: ti.template(), n: ti.i32, level: ti.i32, item: ti.i32):
     g = 0
     if level == 0:
         g = w.parent[item]
-        where = w.x[item]
+        where = w.relaxed[item]
     else:
         g = w.parent[n + item]
         where = w.centre[item]
@@ -76,7 +107,7 @@ def _store(w: ti.template(), n: ti.i32, q: ti.i32, shift, right, turned, both):
 def _gather_nodes(w: ti.template(), n: ti.i32, aggregates: ti.i32, pairs: ti.i32):
     """Level 1, from the matrix of the nodes."""
     for g in range(aggregates):
-        _place(w, w.x, True, g)
+        _place(w, w.relaxed, True, g)
     for q in range(pairs):
         shift, right = ti.Matrix.zero(w.real, 3, 3), ti.Matrix.zero(w.real, 3, 3)
         turned, both = ti.Matrix.zero(w.real, 3, 3), ti.Matrix.zero(w.real, 3, 3)
@@ -208,7 +239,7 @@ class Galerkin:
         self._whole = last if 6 * last <= DENSE else 0
 
     def renew(self, w: World) -> None:
-        """All coarse matrices and inverses, from `w.block` of the nodes at `w.x`."""
+        """All coarse matrices and inverses, from `w.block` of the nodes at `w.relaxed`."""
         n, first, pair = self._n, self._first, self._pair
         _gather_nodes(w, n, first[1], pair[1])
         for level in range(2, len(first)):

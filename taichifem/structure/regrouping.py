@@ -1,25 +1,26 @@
-"""Aggregates of a mesh that was split, from those of the whole one."""
+"""Aggregates of a mesh that was split: grown along its elements, so that each is of what moves as one.
+
+Cracks run where they like: what lies together on both sides of one moves on its own. And what hangs on by a neck, or
+a few nodes between two cracks, is only found by following the elements.
+"""
 
 import numpy as np
 
 from taichifem import runtime
 from taichifem.runtime import ti
 from taichifem.structure.aggregates import BRANCHES, SIZE, TOP, Aggregates
-from taichifem.structure.pieces import root_of
+from taichifem.structure.pattern_kernels import list_corners
 
-CRUMB = 3
-"""Nodes below which a part does not need an aggregate of its own: the smoother does for them."""
+CRUMB = SIZE // 4
+"""Nodes below which what is left between aggregates goes to the neighbour that it has most links with."""
 
 MOST = 2
 """An aggregate of whole pieces ends with this many times the usual nodes."""
 
-MOST_CUTS = 16
-"""Into how many an aggregate whose nodes have many copies is cut at most."""
-
 MORE_LEVELS = 2
 """Levels above those of the whole mesh, at most."""
 
-_list, _lists = ti.types.ndarray(ndim=1), ti.types.ndarray(ndim=2)
+_list = ti.types.ndarray(ndim=1)
 
 
 def most_aggregates(nodes: int, pieces: int, levels: int) -> int:
@@ -28,111 +29,165 @@ def most_aggregates(nodes: int, pieces: int, levels: int) -> int:
 
 
 @ti.kernel
-def _join(corners: ti.template(), cells: _list, key: _lists, above: _lists):
-    """Per row of keys, hang nodes of an element that have the same key on one another, the first one at the root.
+def _grow(
+    corners: ti.template(),
+    cells: _list,
+    start: _list,
+    incident: _list,
+    item_of: _list,
+    item_start: _list,
+    node_of: _list,
+    size: ti.i32,
+    crumb: ti.i32,
+    label: _list,
+    links: _list,
+    votes: _list,
+    front: _list,
+    members: _list,
+    found: _list,
+):
+    """Put items together to labels, 0 and up: from the first one left, whatever has most links with those so far.
 
-    above: every node its own at first; in the end, the first node of its part.
-    """
-    ti.loop_config(block_dim=1)
-    for row in range(key.shape[0]):
-        for e in range(cells.shape[0] // corners):
-            for a in range(1, corners):
-                i = cells[corners * e + a]
-                for b in range(a):
-                    j = cells[corners * e + b]
-                    if key[row, i] == key[row, j] and above[row, i] != above[row, j]:
-                        first, other = root_of(above, row, i), root_of(above, row, j)
-                        if first < other:
-                            above[row, other] = first
-                        else:
-                            above[row, first] = other
-        for i in range(key.shape[1]):
-            above[row, i] = root_of(above, row, i)
-
-
-@ti.kernel
-def _group(part: _list, size: _list, whole: _list, body: _list, weight: _list, only: _list, most: ti.i32, group: _list):
-    """Number items through: a new group where the part changes; but crumbs of the same `whole` keep together.
-
-    size: nodes of the part.
-
-    Items that are the `only` ones of their pieces share a group, until it has the weight `most`.
+    item_of (n,): the item of each node.  item_start, node_of: the nodes of each item.  A link is a corner that an
+    element shares with one of another item. size: nodes with which a label ends; those with less than `crumb` join a
+    neighbour, if they have one.
+    label: -1 at first.  links, votes: 0 at first.  front, members: scratch.  found (1,): how many labels there are.
     """
     ti.loop_config(serialize=True)
     for _ in range(1):
-        count, heavy = -1, 0
-        for k in range(part.shape[0]):
-            new = True
-            if k > 0:
-                crumbs = whole[k] == whole[k - 1] and (heavy < CRUMB or size[k] < CRUMB)
-                together = only[k] == 1 and only[k - 1] == 1 and body[k] == body[k - 1] and heavy + weight[k] <= most
-                new = part[k] != part[k - 1] and not crumbs and not together
-            if new:
-                count += 1
-                heavy = 0
-            heavy += weight[k]
-            group[k] = count
+        count = 0
+        for seed in range(label.shape[0]):
+            if label[seed] >= 0:
+                continue
+            waiting, chosen, nodes = 1, 0, 0
+            front[0] = seed
+            while waiting > 0 and nodes < size:
+                best = 0
+                for k in range(1, waiting):
+                    if links[front[k]] > links[front[best]]:
+                        best = k
+                item = front[best]
+                waiting -= 1
+                front[best] = front[waiting]
+                label[item], links[item], members[chosen] = count, 0, item
+                chosen += 1
+                nodes += item_start[item + 1] - item_start[item]
+                for c in range(item_start[item], item_start[item + 1]):
+                    for k in range(start[node_of[c]], start[node_of[c] + 1]):
+                        for a in range(corners):
+                            other = item_of[cells[corners * (incident[k] >> 2) + a]]
+                            if label[other] < 0:
+                                if links[other] == 0:
+                                    front[waiting] = other
+                                    waiting += 1
+                                links[other] = links[other] + 1
+            for k in range(waiting):
+                links[front[k]] = 0
+            if nodes < crumb:
+                asked, home = 0, -1
+                for member in range(chosen):
+                    item = members[member]
+                    for c in range(item_start[item], item_start[item + 1]):
+                        for k in range(start[node_of[c]], start[node_of[c] + 1]):
+                            for a in range(corners):
+                                other = label[item_of[cells[corners * (incident[k] >> 2) + a]]]
+                                if other >= 0 and other != count:
+                                    if votes[other] == 0:
+                                        front[asked] = other
+                                        asked += 1
+                                    votes[other] = votes[other] + 1
+                for k in range(asked):
+                    if home < 0 or votes[front[k]] > votes[home]:
+                        home = front[k]
+                if home >= 0:
+                    for member in range(chosen):
+                        label[members[member]] = home
+                    count -= 1
+                for k in range(asked):
+                    votes[front[k]] = 0
+            count += 1
+        found[0] = count
 
 
-def _parts(whole: Aggregates, cells: np.ndarray, old: np.ndarray) -> np.ndarray:
-    """First node of the part that each node (n,) belongs to: per level of the whole mesh, and last of its piece.
+def _share(lone: np.ndarray, nodes: np.ndarray, body: np.ndarray, most: int) -> np.ndarray:
+    """The group of each label (k,): those that are whole pieces share groups of some `most` nodes.
 
-    A part is what of an aggregate hangs together. What has hardly more nodes than an aggregate is one part.
+    lone (k,): is it a whole piece, or more?  nodes, body (k,): of each. Those in a group are of one body, and follow
+    one another.
     """
-    keys = [whole.parent[old]]
-    for _ in range(1, whole.levels):
-        keys.append(whole.parent[keys[-1] + len(whole.order)])
-    # Where nodes have many copies, the smallest aggregates are cut as they lie: their nodes come along some axis.
-    begin, end = whole.begin[keys[0]], whole.end[keys[0]]
-    cuts = np.clip((np.bincount(keys[0])[keys[0]] + SIZE // 2) // SIZE, 1, MOST_CUTS)
-    keys[0] = MOST_CUTS * keys[0] + cuts * (old - begin) // (end - begin)
-    keys = np.array([*keys, np.zeros(len(old))], dtype=np.int32)
-    parts = np.tile(np.arange(len(old), dtype=np.int32), (len(keys), 1))
-    _join(cells.shape[1], np.ascontiguousarray(cells, dtype=np.int32).ravel(), keys, parts)
-    for level in reversed(range(whole.levels)):
-        above = parts[level + 1]
-        small = np.bincount(above)[above] <= SIZE * BRANCHES**level
-        parts[level, small] = above[small]
-    return parts
+    group = np.arange(len(lone))
+    which = np.flatnonzero(lone)
+    before = np.cumsum(nodes[which]) - nodes[which]
+    shelf = before // most
+    first = np.r_[True, (np.diff(shelf) != 0) | (np.diff(body[which]) != 0)][: len(which)]
+    group[which] = which[np.maximum.accumulate(np.where(first, np.arange(len(which)), 0))]
+    return np.unique(group, return_inverse=True)[1]
 
 
-def regroup(whole: Aggregates, cells: np.ndarray, old: np.ndarray, body: np.ndarray) -> tuple[Aggregates, np.ndarray]:
-    """Aggregates of a mesh that was split: of nodes that hang together, and were in one aggregate.
+def regroup(cells: np.ndarray, body: np.ndarray, piece: np.ndarray, levels: int) -> tuple[Aggregates, np.ndarray]:
+    """Aggregates of a mesh that was split.
 
     Gives also where in their order the pieces begin, and the last one ends (pieces+1,).
 
-    cells (m,d+1): the elements.  old (n,): of which node of the whole mesh each is, or is a copy of, in ascending
-    order.  body (n,): of each.
+    cells (m,d+1): the elements.  body, piece (n,): of each node; nodes lie in space as their numbers do, about.
+    levels: of the whole mesh.
     As long as a piece has several aggregates, it shares none. Then what lies together is put together, also where
     nothing joins it: pieces that press upon one another move together. No aggregate has two bodies.
     """
     runtime.start()
-    of, n = np.int32, len(old)
-    parts = _parts(whole, cells, old)
-    order = np.lexsort(parts)
-    parts, body = [part[order] for part in parts], body[order].astype(of)
-    bodies = 1 + np.count_nonzero(np.diff(body))
-    weight, item = np.ones(n, dtype=of), np.arange(n)  # item: the first node of each
-    first, begin, end, parent, total = [0], [], [], [], 0
-    for level in range(whole.levels + MORE_LEVELS):
-        part, above = (parts[min(k, whole.levels)][item] for k in (level, level + 1))
-        most = MOST * SIZE * BRANCHES**level if level < whole.levels else 2 * n
-        piece = parts[-1][item]
-        only = np.bincount(piece)[piece] == 1 if level else np.zeros(n)
-        group = np.empty(len(item), dtype=of)
-        size = np.bincount(part, weight)[part].astype(of)
-        _group(part, size, above, body[item], weight, only.astype(of), most, group)
-        starts = np.flatnonzero(np.r_[True, group[1:] != group[:-1]])
-        below = total - len(group) if level else 0
-        begin.append(starts + below)
-        end.append(np.r_[starts[1:], len(group)] + below)
-        parent.append(group + total)
-        weight, item = np.add.reduceat(weight, starts).astype(of), item[starts]
-        total += len(starts)
-        first.append(total)
-        if len(starts) <= max(TOP, bodies):
+    of, n, corners = np.int32, len(body), cells.shape[1]
+    flat = np.ascontiguousarray(cells, dtype=of).ravel()
+    start, incident = np.zeros(n + 1, dtype=of), np.empty(flat.size, dtype=of)
+    list_corners(corners, flat, start, incident)
+    item, count, labels = np.arange(n, dtype=of), n, []
+    for level in range(levels + MORE_LEVELS):
+        node_of = np.argsort(item, kind="stable").astype(of)
+        nodes = np.bincount(item)
+        item_start = np.r_[0, np.cumsum(nodes)].astype(of)
+        label, found = np.full(count, -1, dtype=of), np.zeros(1, dtype=of)
+        links, votes = np.zeros(count, dtype=of), np.zeros(count, dtype=of)
+        front, members = np.empty(count, dtype=of), np.empty(count, dtype=of)
+        parts = label, links, votes, front, members, found
+        size, crumb = SIZE * BRANCHES**level, CRUMB * BRANCHES**level
+        _grow(corners, flat, start, incident, item, item_start, node_of, size, crumb, *parts)
+        of_node, k = label[item], int(found[0])
+        if level:
+            several = np.bincount(np.unique(piece * np.int64(k) + of_node) // k) > 1
+            lone, belongs = np.ones(k, dtype=bool), np.empty(k, dtype=of)
+            lone[of_node[several[piece]]] = False
+            belongs[of_node] = body
+            most = MOST * size if level < levels else 2 * n
+            group = _share(lone, np.bincount(of_node), belongs, most)
+            of_node, k = group[of_node].astype(of), int(group.max()) + 1
+        if k < count:
+            labels.append(of_node)
+            item, count = of_node, k
+        if count <= max(TOP, 1 + np.count_nonzero(np.diff(body))):
             break
-    parent.append(np.full(len(starts), -1))
+    return _number(labels, piece, body)
+
+
+def _number(labels: list[np.ndarray], piece: np.ndarray, body: np.ndarray) -> tuple[Aggregates, np.ndarray]:
+    """Number the labels (n,) of all levels through, each a range of those below; and where pieces begin."""
+    of, n = np.int32, len(body)
+    keys = []
+    for label in labels:
+        # Those of one piece follow one another; of groups of pieces, the first one counts.
+        lead = np.full(label.max() + 1, n)
+        np.minimum.at(lead, label, piece)
+        keys += [label, lead[label]]
+    order = np.lexsort((*keys, body))
+    first, begin, end, parent, below = [0], [], [], [], np.arange(n)
+    for label in labels:
+        starts = np.flatnonzero(np.r_[True, np.diff(label[order]) != 0])
+        edges = np.r_[np.searchsorted(below, starts), len(below)]
+        offset = first[-2] if len(first) > 1 else 0
+        begin.append(edges[:-1] + offset)
+        end.append(edges[1:] + offset)
+        parent.append(np.repeat(np.arange(len(starts)), np.diff(edges)) + first[-1])
+        first.append(first[-1] + len(starts))
+        below = starts
+    parent.append(np.full(len(below), -1))
     narrow = [np.concatenate(a).astype(of) for a in (begin, end, parent)]
-    piece_start = np.flatnonzero(np.r_[True, np.diff(parts[-1]) != 0, True]).astype(of)
+    piece_start = np.flatnonzero(np.r_[True, np.diff(piece[order]) != 0, True]).astype(of)
     return Aggregates(order, np.array(first, dtype=of), *narrow), piece_start

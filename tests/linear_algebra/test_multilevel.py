@@ -7,6 +7,7 @@ import scipy.sparse.linalg
 import taichifem as tf
 from taichifem import transfer
 from taichifem.linear_algebra import crew
+from taichifem.linear_algebra.galerkin import relax
 
 SIZE, CELLS = (1.0, 0.25, 0.25), (20, 5, 5)
 HELD = tf.BoxRegion(lower=(-1, -1, -1), upper=(1e-6, 1, 1))
@@ -74,8 +75,9 @@ def coarse_matrix(simulation):
     """The Galerkin matrix of the first level as the world has it, and as Z^T A Z with Z written out."""
     w, found, levels = simulation._world, simulation._layout.aggregates, simulation._levels
     n, count = simulation._counts.nodes, found.first[1]
-    x, pattern = simulation.positions[simulation._layout.node_order], simulation._pattern
+    x, pattern = simulation.rest_positions[simulation._layout.node_order], simulation._pattern
     with simulation._kernels():
+        relaxed = transfer.read(w, w.relaxed, n)
         blocks = transfer.read(w, w.block, len(levels.column))
     last = levels.row_start[n + 2 * count]
     start = levels.row_start[n : n + 2 * count + 1] - pattern.n_blocks
@@ -89,7 +91,7 @@ def coarse_matrix(simulation):
     Z = np.zeros((n, 3, 6 * count))
     for g in range(count):
         nodes = np.arange(found.begin[g], found.end[g])
-        arm = x[nodes] - x[nodes].mean(axis=0)
+        arm = relaxed[nodes] - relaxed[nodes].mean(axis=0)
         arm /= np.sqrt((arm**2).sum(axis=1).mean())
         Z[nodes, :, 6 * g : 6 * g + 3] = np.eye(3)
         Z[nodes, :, 6 * g + 3 : 6 * g + 6] = np.cross(np.eye(3)[None], arm[:, None]).transpose(0, 2, 1)
@@ -101,10 +103,31 @@ def coarse_matrix(simulation):
 def test_the_coarse_matrix_is_that_of_the_rigid_motions_of_aggregates():
     simulation = tf.Simulation(tf.Scene(bodies=[bar()]), precision="f64")
     simulation.step()
-    with simulation._kernels():
-        simulation._galerkin.renew(simulation._world)  # at the positions that we can read
     gathered, expected = coarse_matrix(simulation)
     assert gathered == pytest.approx(expected, abs=1e-12 * abs(expected).max())
+
+
+@pytest.mark.parametrize("model", ["linear", "corotational", "stvk"])
+def test_turns_of_a_strained_splinter_are_those_that_cost_nothing(model):
+    points = np.array([[0, 0, 0], [1, 0, 0], [0, 1, 0], [0, 0, 1.0]])
+    material = tf.Material(youngs=1e6, poisson=0.3, model=model)
+    body = tf.Body(mesh=tf.TetMesh(points, np.array([[0, 1, 2, 3]])), material=material)
+    simulation = tf.Simulation(tf.Scene(bodies=[body], gravity=(0, 0, 0)), precision="f64")
+    w, n = simulation._world, 4
+    turn = np.array([[0.8, -0.6, 0], [0.6, 0.8, 0], [0, 0, 1.0]]) if model == "corotational" else np.eye(3)
+    strained = (points * (1.2, 1.0, 0.9)) @ turn.T
+    simulation.set_positions(strained)
+    K = simulation.stiffness()
+    with simulation._kernels():
+        relax(w, n, 1)
+    relaxed = simulation._given(transfer.read(w, w.relaxed, n))
+    if model == "stvk":  # its stress turns with it, so that the strained shape is the one that counts
+        assert relaxed == pytest.approx(strained, abs=1e-12)
+        return
+    assert relaxed == pytest.approx((points - points.mean(axis=0)) @ turn.T + strained.mean(axis=0), abs=1e-12)
+    for axis in np.eye(3):
+        forces = [abs(K @ np.cross(axis, x).ravel()).max() for x in (relaxed, strained)]
+        assert forces[0] < 1e-9 * forces[1]
 
 
 @pytest.mark.parametrize("precision", ["f32", "f64"])

@@ -9,7 +9,8 @@ from scipy.sparse.csgraph import connected_components
 
 from taichifem.mesh import TetMesh
 from taichifem.structure.aggregates import SIZE, aggregate
-from taichifem.structure.regrouping import CRUMB, MOST, regroup
+from taichifem.structure.pieces import label_pieces
+from taichifem.structure.regrouping import MOST, regroup
 from taichifem.structure.splitting import Splitting
 
 
@@ -32,7 +33,8 @@ def split(seed: int, splits: int):
     order = np.argsort(apart.origin, kind="stable")
     old, placed = apart.origin[order], np.argsort(order)[apart.cells]
     body = (whole.order[old] >= n).astype(int)
-    return whole, placed, old, body, *regroup(whole, placed, old, body)
+    piece = label_pieces(placed, len(old))[2]
+    return whole, placed, old, body, *regroup(placed, body, piece, whole.levels)
 
 
 def parts(cells: np.ndarray, chosen: np.ndarray) -> np.ndarray:
@@ -58,8 +60,7 @@ def test_an_aggregate_hangs_together_and_has_one_body(splits):
         chosen = np.zeros(n, dtype=bool)
         chosen[found.order[found.begin[g] : found.end[g]]] = True
         assert len(set(body[chosen])) == 1
-        # Crumbs may join, alone or a few: the smoother does for them.
-        assert (parts(cells, chosen) > 2 * CRUMB).sum() <= 1
+        assert len(parts(cells, chosen)) == 1
         assert chosen.sum() < 2 * MOST * SIZE
 
 
