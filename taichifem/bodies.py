@@ -18,13 +18,11 @@ from taichifem.laws import Laws
 from taichifem.layout import AXES, Layout, lay_out
 from taichifem.linear_algebra import assembly, balance, bandwidth
 from taichifem.linear_algebra.bandwidth import Bandwidth
-from taichifem.linear_algebra.galerkin import Galerkin
-from taichifem.linear_algebra.program import write_program
+from taichifem.linear_algebra.plan import Plan, make_plan
 from taichifem.linear_algebra.spectrum import highest_frequency
 from taichifem.processes.loading import Loading
 from taichifem.room import assert_room, room_for
-from taichifem.structure.levels import Levels, stack_levels
-from taichifem.structure.pattern import BlockPattern, block_pattern, to_sparse
+from taichifem.structure.pattern import corners_at, to_sparse
 from taichifem.surface import Surface, whole_surface
 from taichifem.surroundings import Surroundings, pose
 from taichifem.world import Counts, World, acquire
@@ -51,29 +49,41 @@ class Bodies:
         self._first_surface = whole_surface(scene)
         self._take(layout)
         self._generation = runtime.generation
-        room = room_for(scene, layout, self._laws, pattern=self._pattern, levels=self._levels, program=self._program)
-        self._world: World = acquire(room, precision, self)
+        plan = make_plan(layout.cells, len(layout.rest), layout.aggregates, solver=scene.solver)
+        self._world: World = acquire(room_for(scene, layout, self._laws, plan), precision, self)
         self._counts = Counts(bodies=len(scene.bodies), colliders=len(scene.colliders))
         self._hands = Hands()
         self._fill()
+        self._tell(plan)
         self._gravity = np.asarray(scene.gravity, dtype=float)
         self._due = 0.0  # time over which plastic flow is due: it is made up for when the next step begins [s]
 
     def _take(self, layout: Layout) -> None:
-        """Take a layout, and work out all that follows from its mesh."""
+        """Take a layout, and work out what follows from its mesh; the matrix can wait until it is asked for."""
         self._layout = layout
         self._loading = Loading(layout)
-        self._plan_matrix(layout.cells)
+        self._plan_for(layout.cells)
 
-    def _plan_matrix(self, cells: np.ndarray) -> None:
-        """Work out which blocks the matrix of some cells (k,d+1) has, and how it is solved."""
-        layout = self._layout
-        self._pattern: BlockPattern = block_pattern(cells, len(layout.rest))
-        self._levels: Levels = stack_levels(self._pattern, layout.aggregates)
-        self._galerkin = Galerkin(layout.aggregates, self._levels) if self.scene.solver == "multilevel" else None
-        self._program = write_program(
-            self._pattern, layout.aggregates, solver=self.scene.solver, apart=self._levels.apart
-        )
+    def _plan_for(self, cells: np.ndarray) -> None:
+        """From now on, the matrix is that of some cells (k,d+1)."""
+        self._in_matrix, self._told = cells, None
+
+    @property
+    def _plan(self) -> Plan:
+        """Which blocks the matrix has, and how it is solved; the world knows as well, from when it is asked for."""
+        if self._told is None:
+            layout = self._layout
+            self._tell(make_plan(self._in_matrix, len(layout.rest), layout.aggregates, solver=self.scene.solver))
+        return self._told
+
+    def _tell(self, plan: Plan) -> None:
+        """Give the world what it has to know of the matrix."""
+        assert_room(self._world.capacity, plan)
+        self._counts.pairs, self._counts.pieces = plan.pattern.n_pairs, plan.pattern.pieces
+        with self._kernels():
+            transfer.fill_pattern(self._world, plan.pattern)
+            transfer.fill_levels(self._world, plan.pattern, plan.levels, self._layout.aggregates, plan.program)
+        self._told = plan
 
     def _fill(self) -> None:
         """Fill the world with it, at rest."""
@@ -86,23 +96,13 @@ class Bodies:
 
     def _fill_topology(self) -> None:
         """Give the world what follows from the mesh."""
-        layout, pattern = self._layout, self._pattern
+        layout = self._layout
         self._counts.nodes, self._counts.elements = len(layout.rest), len(layout.cells)
         # Springs were those of another mesh; what new nodes find in their places is someone else's.
         self._counts.meetings, self._counts.sprung = 0, True
         with self._kernels():
-            transfer.fill_mesh(self._world, layout, pattern)
-        self._fill_matrix()
+            transfer.fill_mesh(self._world, layout, *corners_at(layout.cells, len(layout.rest)))
         self._surroundings = Surroundings(self.scene, layout, self._world, self._counts, self._hands)
-
-    def _fill_matrix(self) -> None:
-        """Give the world what the solver has to know of the matrix."""
-        pattern = self._pattern
-        assert_room(self._world.capacity, pattern, self._levels, self._program)
-        self._counts.pairs, self._counts.pieces = pattern.n_pairs, pattern.pieces
-        with self._kernels():
-            transfer.fill_pattern(self._world, pattern)
-            transfer.fill_levels(self._world, pattern, self._levels, self._layout.aggregates, self._program)
 
     def _kernels(self):
         """Around every use of the fields: the right precision, and fields that still exist."""
@@ -270,7 +270,7 @@ class Bodies:
         solves by Newton's method; then they, and all others always, give the exact tangent. Those with rotation "qr"
         stay with the warped one.
         """
-        pattern = self._pattern
+        pattern = self._plan.pattern
         with self._kernels():
             self._laws.deform(self._world, self._counts, stiffness=1.0, due=self._due, projected=projected)
             assembly.assemble(self._world, self._counts.pairs, self._counts.elements, 0.0, 0.0)
@@ -279,8 +279,9 @@ class Bodies:
 
     def product_bandwidth(self) -> Bandwidth:
         """How fast the linear solver's matrix product is, against a plain read; after a step of an implicit method."""
+        blocks = self._plan.pattern.n_blocks
         with self._kernels():
-            return bandwidth.measure(self._world, self._counts, self._pattern.n_blocks)
+            return bandwidth.measure(self._world, self._counts, blocks)
 
     def _measure(self) -> None:
         with self._kernels():

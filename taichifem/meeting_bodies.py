@@ -45,8 +45,7 @@ class MeetingBodies(BreakingBodies):
             cells = transfer.read_integers(w.meeting_cell, counts.meetings)
         self.more_meetings = len(cells) == w.meeting_cell.shape[0]
         if not np.array_equal(cells, self._met):
-            self._plan_matrix(np.concatenate([self._layout.cells, cells]))
-            self._fill_matrix()
+            self._plan_for(np.concatenate([self._layout.cells, cells]))
             self._met = cells
 
     def _introduce(self) -> None:

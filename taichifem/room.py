@@ -10,17 +10,15 @@ from taichifem.description import Scene
 from taichifem.hands import ROOM
 from taichifem.laws import Laws
 from taichifem.layout import Layout
+from taichifem.linear_algebra.plan import Plan
 from taichifem.linear_algebra.program import most_operations
-from taichifem.structure.levels import Levels
-from taichifem.structure.pattern import BlockPattern
 from taichifem.structure.regrouping import MORE_LEVELS, most_aggregates
 from taichifem.world import Capacity
 
 
-def room_for(
-    scene: Scene, layout: Layout, laws: Laws, *, pattern: BlockPattern, levels: Levels, program: np.ndarray
-) -> Capacity:
+def room_for(scene: Scene, layout: Layout, laws: Laws, plan: Plan) -> Capacity:
     """Room for a scene; where it may break, until every element is on its own."""
+    pattern, levels, program = plan.pattern, plan.levels, plan.program
     capacity = Capacity(
         nodes=len(layout.rest),
         elements=len(layout.cells),
@@ -47,11 +45,12 @@ def room_for(
     return _meeting(capacity, layout) if scene.pieces_meet else capacity
 
 
-def assert_room(capacity: Capacity, pattern: BlockPattern, levels: Levels, program: np.ndarray) -> None:
+def assert_room(capacity: Capacity, plan: Plan) -> None:
     """Raise MemoryError if what came of a mesh that was split is more than there was thought to be room for.
 
     Kernels do not look: what is written behind a field's end spoils another.
     """
+    pattern, levels, program = plan.pattern, plan.levels, plan.program
     needed = {
         "blocks": pattern.n_blocks,
         "pairs": pattern.n_pairs,

@@ -119,6 +119,8 @@ class Simulation(InteractiveBodies):
             "max_iterations": scene.max_iterations,
             "newton_tolerance": scene.newton_tolerance,
         }
+        with self._timer.phase("set-up"):
+            plan = None if self._explicit else self._plan
         step = Step(
             w=self._world,
             counts=self._counts,
@@ -127,8 +129,7 @@ class Simulation(InteractiveBodies):
             gravity=self._gravity,
             options=Options(**chosen | options),
             timer=self._timer,
-            program=self._program,
-            galerkin=self._galerkin,
+            plan=plan,
             follow=self._follow if self._loading.follows else None,
             due=self._due,
             # Methods that look back start anew where a load jumps: they would smear it over the steps around.

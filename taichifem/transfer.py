@@ -221,9 +221,9 @@ def fill(w: World, layout: Layout) -> None:
     _fill_elements(w, indices, _real(w, layout.gradients), _real(w, layout.volumes))
 
 
-def fill_mesh(w: World, layout: Layout, pattern: BlockPattern) -> None:
+def fill_mesh(w: World, layout: Layout, incident_start: np.ndarray, incident: np.ndarray) -> None:
     """Rest shape and elements, and which corners meet at each node."""
-    _fill_mesh(w, _real(w, layout.rest), layout.cells, pattern.incident_start, pattern.incident)
+    _fill_mesh(w, _real(w, layout.rest), layout.cells, incident_start, incident)
 
 
 def fill_pattern(w: World, pattern: BlockPattern) -> None:

@@ -37,7 +37,7 @@ LOOSEST = 0.1
 NEAR = 0.1
 """Imbalance, relative to the forces at work, below which tangents are exact."""
 
-PASS = 25
+PASS = 10
 """Iterations of a solve with slack at most: the next one goes on from where it ends, with contacts renewed."""
 
 ALWAYS = 1e30
@@ -138,8 +138,7 @@ def solve(step: Step, *, h: float, newton: int, inertia: bool = True) -> StepRep
             return pcg.solve(
                 w,
                 counts,
-                step.program,
-                step.galerkin,
+                step.plan,
                 tolerance=min(step.options.tolerance * slack, LOOSEST),
                 max_iterations=step.options.max_iterations if slack == 1 else PASS,
                 noise=noise,
@@ -200,7 +199,7 @@ def _linearise(step: Step, h: float, inertia: bool, *, first: bool = False, exac
             keep=True,
         )
         _load(w, n, h, damped, *step.gravity)
-        if step.galerkin is not None:
+        if step.plan.galerkin is not None:
             relax(w, n, step.counts.elements)
         if not first:
             _forget(w, n)

@@ -8,7 +8,7 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from taichifem.laws import Laws
-from taichifem.linear_algebra.galerkin import Galerkin
+from taichifem.linear_algebra.plan import Plan
 from taichifem.timing import PhaseTimer
 from taichifem.world import Counts, World
 
@@ -56,7 +56,7 @@ class StepReport:
 class Step:
     """A step of `dt` [s]: the world, where its poses and colliders stand at the end of it, and how to solve.
 
-    gravity: (3,) [m/s^2].  program, galerkin: of the linear solver (`pcg.solve`).
+    gravity: (3,) [m/s^2].  plan: of the linear solver; explicit methods need none.
     follow: brings loads that follow the surface up to date, where there are any.
     due: time over which plastic flow is due [s]: the last step has moved the nodes, but nothing has flowed since.
     fresh: there is no past step to go on from.  damped: has some material stiffness damping?
@@ -69,8 +69,7 @@ class Step:
     gravity: np.ndarray
     options: Options
     timer: PhaseTimer
-    program: np.ndarray
-    galerkin: Galerkin | None
+    plan: Plan | None
     follow: Callable[[], None] | None = None
     due: float = 0.0
     fresh: bool = True

@@ -17,8 +17,8 @@ import numpy as np
 
 from taichifem.errors import Diverged
 from taichifem.linear_algebra import balance, crew, steps
-from taichifem.linear_algebra.galerkin import Galerkin
 from taichifem.linear_algebra.guess import guess
+from taichifem.linear_algebra.plan import Plan
 from taichifem.linear_algebra.program import PLAIN_ROUND
 from taichifem.linear_algebra.steps import COUNT, DONE, INDEFINITE, NOISE, RESIDUAL, RZ, SIZE, Limits
 from taichifem.world import MOST_TURNS, Counts, World
@@ -50,8 +50,7 @@ class Convergence:
 def solve(
     w: World,
     counts: Counts,
-    program: np.ndarray,
-    galerkin: Galerkin | None,
+    plan: Plan,
     *,
     tolerance: float,
     max_iterations: int,
@@ -62,7 +61,7 @@ def solve(
 ) -> Convergence:
     """Improve `w.dv` until the residual is below `tolerance` times what acts on the nodes.
 
-    program: its operations.  galerkin: makes the coarse matrices, if the program wants them.
+    plan: of the matrix.
     w: world with own, block, spring, load, spring_load, free and the start dv.
     noise: relative rounding error of the forces, over dt.  weight: gravity times dt [m/s].
     drag_factor: of `w.drag` in the matrix.
@@ -77,6 +76,7 @@ def solve(
         steps.begin(w, n, counts.pieces)
     if flying:
         balance.translate(w, flying, drag_factor)
+    galerkin, program = plan.galerkin, plan.program
     if galerkin is not None:
         galerkin.renew(w)
     limits = Limits(tolerance, max_iterations)

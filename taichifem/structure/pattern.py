@@ -43,7 +43,6 @@ class BlockPattern:
         element * 16 + a * 4 + b with local nodes a (row i) and b (column j). Gathering them in this order
         makes sums repeat bit for bit.
     diagonal (n,): where block (i, i) stands.
-    incident_start (n+1,), incident: the element corners at each node, as element * 4 + a.
     pieces: how many.
     """
 
@@ -57,8 +56,6 @@ class BlockPattern:
     upper: np.ndarray
     lower: np.ndarray
     diagonal: np.ndarray
-    incident_start: np.ndarray
-    incident: np.ndarray
     pieces: int
 
     @property
@@ -86,9 +83,7 @@ def block_pattern(cells: np.ndarray, n_nodes: int) -> BlockPattern:
     flat = np.ascontiguousarray(cells, dtype=of).ravel()
     pieces = pieces_of(n, NODES)
     piece = np.repeat(np.arange(pieces, dtype=of), np.diff(piece_starts(n, pieces)))
-    start, incident = np.zeros(n + 1, dtype=of), np.empty(size, dtype=of)
-    kernels.list_corners(corners, flat, start, incident)
-
+    start, incident = corners_at(cells, n)
     j_of, adding, slot = (np.empty(corners * size, dtype=of) for _ in range(3))
     pairs, entries, lower_far, far = (np.zeros(n, dtype=of) for _ in range(4))
     kernels.find_pairs(corners, flat, start, incident, j_of, adding, slot, pairs, entries)
@@ -130,10 +125,17 @@ def block_pattern(cells: np.ndarray, n_nodes: int) -> BlockPattern:
         upper=upper,
         lower=lower,
         diagonal=upper[first_pair[:-1]],
-        incident_start=start,
-        incident=incident,
         pieces=pieces,
     )
+
+
+def corners_at(cells: np.ndarray, n_nodes: int) -> tuple[np.ndarray, np.ndarray]:
+    """Where the corners at each node begin (n+1,), and which they are, as element * 4 + a, in their order."""
+    runtime.start()
+    flat = np.ascontiguousarray(cells, dtype=np.int32).ravel()
+    start, incident = np.zeros(n_nodes + 1, dtype=np.int32), np.empty(len(flat), dtype=np.int32)
+    kernels.list_corners(cells.shape[1], flat, start, incident)
+    return start, incident
 
 
 def starts_of(sizes: np.ndarray) -> np.ndarray:

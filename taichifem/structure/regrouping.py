@@ -6,10 +6,9 @@ a few nodes between two cracks, is only found by following the elements.
 
 import numpy as np
 
-from taichifem import runtime
 from taichifem.runtime import ti
 from taichifem.structure.aggregates import BRANCHES, SIZE, TOP, Aggregates
-from taichifem.structure.pattern_kernels import list_corners
+from taichifem.structure.pattern import corners_at
 
 CRUMB = SIZE // 4
 """Nodes below which what is left between aggregates goes to the neighbour that it has most links with."""
@@ -134,11 +133,9 @@ def regroup(cells: np.ndarray, body: np.ndarray, piece: np.ndarray, levels: int)
     As long as a piece has several aggregates, it shares none. Then what lies together is put together, also where
     nothing joins it: pieces that press upon one another move together. No aggregate has two bodies.
     """
-    runtime.start()
     of, n, corners = np.int32, len(body), cells.shape[1]
     flat = np.ascontiguousarray(cells, dtype=of).ravel()
-    start, incident = np.zeros(n + 1, dtype=of), np.empty(flat.size, dtype=of)
-    list_corners(corners, flat, start, incident)
+    start, incident = corners_at(cells, n)
     item, count, labels = np.arange(n, dtype=of), n, []
     for level in range(levels + MORE_LEVELS):
         node_of = np.argsort(item, kind="stable").astype(of)

@@ -33,9 +33,9 @@ def test_the_guess_is_the_best_combination_of_the_past():
         steps.prepare(w, n, pieces, 0.0, 0.0)
         guess.guess(w, n, pieces)
         dv, residual, free = (transfer.read(w, field, n) for field in (w.dv, w.residual, w.free))
-        blocks = transfer.read(w, w.block, simulation._pattern.n_blocks)
+        blocks = transfer.read(w, w.block, simulation._plan.pattern.n_blocks)
     assert 0 < free.sum() < free.size
-    A = to_sparse(simulation._pattern, blocks, np.arange(n))
+    A = to_sparse(simulation._plan.pattern, blocks, np.arange(n))
     V = (past[..., 1:] * free[..., None]).reshape(3 * n, -1)
     h = ((1 - free) * held).ravel()
     c = np.linalg.solve(V.T @ (A @ V), V.T @ (load.ravel() - A @ h))

@@ -73,9 +73,9 @@ def test_an_operation_a_launch_gives_the_same_answer(monkeypatch):
 
 def coarse_matrix(simulation):
     """The Galerkin matrix of the first level as the world has it, and as Z^T A Z with Z written out."""
-    w, found, levels = simulation._world, simulation._layout.aggregates, simulation._levels
+    w, found, levels = simulation._world, simulation._layout.aggregates, simulation._plan.levels
     n, count = simulation._counts.nodes, found.first[1]
-    x, pattern = simulation.rest_positions[simulation._layout.node_order], simulation._pattern
+    x, pattern = simulation.rest_positions[simulation._layout.node_order], simulation._plan.pattern
     with simulation._kernels():
         relaxed = transfer.read(w, w.relaxed, n)
         blocks = transfer.read(w, w.block, len(levels.column))
