@@ -50,12 +50,12 @@ def _shatter(precision: str) -> dict:
 
     mesh = TetMesh.bar(size=(1.2, 0.8, 0.05), cells=(56, 38, 1))
     glass = Material(
-        youngs=2e7,
+        youngs=5e6,
         poisson=0.25,
         density=1500.0,
         mass_damping=0.2,
         stiffness_damping=5e-4,
-        fracture=Fracture(toughness=1.5e5),
+        fracture=Fracture(toughness=4e5, criterion="separation-tensor"),
     )
     fall = Motion(times=(0.0, 0.2, 0.4, 0.6), translation=((0, 0, 0), (0, 0, -0.4), (0, 0, -0.7), (0, 0, 0)))
     ball = SphereCollider(center=(0.65, 0.45, 0.87), radius=0.12, motion=fall)
