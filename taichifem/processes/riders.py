@@ -16,6 +16,9 @@ CELLS, RIDERS = 0, 1
 MARGIN = 0.5
 """Of a tetrahedron's size: what the forces of a step may at most add to its way towards a collider."""
 
+NOTHING = 1e-5
+"""Weights below this are round-off: of the node there is no share."""
+
 
 @ti.data_oriented
 class Riders:
@@ -23,7 +26,7 @@ class Riders:
 
     Of a tetrahedron that holds some: `cell`, its number in the world; `first` of its vertices; `reach`, how far they
     lie from its middle at most, in terms of its farthest node; `close`, is it near a collider?  Of a vertex: `of`, its
-    tetrahedron here; `weight`; `part` of the stiffness and mass of its nodes that is its own; what its contacts
+    tetrahedron here; `weight`; `share` of each of its nodes that is its own (`riding`); what its contacts
     add to the matrix (`stiff`) and to the load (`push`); `acting`.  As in `World`: `slip`, `pressed`, `touching`.
     `near_cell`, `near`, `near_count`: lists of what is near.  `crowd` of a node: weights that act on it.
     `kept`, `kept_at`, `kept_count`: blocks of the matrix as they were assembled.
@@ -52,7 +55,7 @@ class Riders:
         self.cell, self.first, self.close = (scalar(k, ti.i32) for k in (cells, cells + 1, cells))
         self.reach = scalar(cells)
         self.of, self.acting, self.near = (scalar(riders, ti.i32) for _ in range(3))
-        self.weight, self.part = vector(riders, 4), scalar(riders)
+        self.weight, self.share = vector(riders, 4), vector(riders, 4)
         self.stiff, self.push = matrix(riders), vector(riders, 3)
         self.near_cell, self.near_count = scalar(cells, ti.i32), scalar(2, ti.i32)
         self.crowd = scalar(w.capacity.nodes)
@@ -79,10 +82,10 @@ def _is_near(w: ti.template(), r: ti.template(), q: ti.i32, n_colliders: ti.i32,
     """May a vertex in tetrahedron q meet a collider within the step?"""
     e = r.cell[q]
     middle, near = ti.Vector.zero(w.real, 3), 0
-    for a in ti.static(range(4)):
+    for a in range(4):
         middle += 0.25 * w.x[w.cell[e][a]]
     size, fastest = ti.cast(0.0, w.real), ti.cast(0.0, w.real)
-    for a in ti.static(range(4)):
+    for a in range(4):
         size = ti.max(size, (w.x[w.cell[e][a]] - middle).norm())
         fastest = ti.max(fastest, w.v[w.cell[e][a]].norm())
     for c in range(n_colliders):
@@ -97,7 +100,7 @@ def _is_near(w: ti.template(), r: ti.template(), q: ti.i32, n_colliders: ti.i32,
 def at(w: ti.template(), r: ti.template(), p: ti.i32, field: ti.template()):
     """A value of the nodes (vectors) where vertex p is."""
     value = ti.Vector.zero(w.real, 3)
-    for a in ti.static(range(4)):
+    for a in range(4):
         value += r.weight[p][a] * field[w.cell[r.cell[r.of[p]]][a]]
     return value
 
@@ -143,14 +146,13 @@ def find(w: ti.template(), r: ti.template(), n_cells: ti.i32, n_colliders: ti.i3
         if r.acting[p] == 1:
             for a in range(4):
                 i = w.cell[r.cell[r.of[p]]][a]
-                r.crowd[i] = r.crowd[i] + r.weight[p][a]
+                r.crowd[i] = r.crowd[i] + ti.abs(r.weight[p][a])
     for k in range(r.near_count[RIDERS]):
         p = r.near[k]
-        own = r.weight[p].norm_sqr()
-        overlap = own if r.acting[p] == 0 else ti.cast(0.0, w.real)
-        for a in ti.static(range(4)):
-            overlap += r.weight[p][a] * r.crowd[w.cell[r.cell[r.of[p]]][a]]
-        r.part[p] = 1 / ti.max(overlap, own)
+        for a in range(4):
+            own = ti.abs(r.weight[p][a])
+            crowd = r.crowd[w.cell[r.cell[r.of[p]]][a]] + (own if r.acting[p] == 0 else 0.0)
+            r.share[p][a] = own / crowd if own > ti.cast(NOTHING, w.real) else 0.0
     return r.near_count[RIDERS]
 
 

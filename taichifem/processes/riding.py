@@ -5,8 +5,9 @@ are an element of four nodes to the solver, with w_a w_b times their stiffness b
 these are in the matrix already, since a vertex lies in one tetrahedron; so they are added to what is assembled, and
 taken out again when the next pass looks at the contacts anew.
 
-A cage has far fewer nodes than its surface has vertices. So that a crowd of them is together as stiff as the nodes
-would be, a vertex has the stiffness of its nodes over the overlap sum_q w . w_q with all vertices q that touch.
+A cage has far fewer nodes than its surface has vertices. Each of those that touch has the share |w_a| / sum_q |w_qa| of
+node a, where q are all that touch, and the springs of its shares of nodes: so
+however many touch, their stiffness stays about that of the nodes.
 """
 
 import numpy as np
@@ -17,14 +18,18 @@ from taichifem.runtime import ti
 from taichifem.transfer import dtype_of
 from taichifem.world import Counts, World
 
+FIRMNESS = 2.0
+"""Times the stiffness of a vertex's shares: at the edge of a crowd, a vertex carries more than its share of the weight,
+and is to sink in no deeper than a node would."""
+
 
 @ti.func
 def _stiffness(w: ti.template(), r: ti.template(), p: ti.i32, h):
-    """Stiffness [N/m] of the contact springs of vertex p. Outside of its tetrahedron some weights are negative."""
+    """Stiffness [N/m] of the contact springs of vertex p."""
     total = ti.cast(0.0, w.real)
-    for a in ti.static(range(4)):
-        total += ti.abs(r.weight[p][a]) * contact.stiffness(w, w.cell[r.cell[r.of[p]]][a], h)
-    return r.part[p] * total
+    for a in range(4):
+        total += r.share[p][a] * contact.stiffness(w, w.cell[r.cell[r.of[p]]][a], h)
+    return ti.cast(FIRMNESS, w.real) * total
 
 
 @ti.func
@@ -151,8 +156,8 @@ def _press(
         step, whole = ti.cast(h, w.real), ti.cast(dt, w.real)
         end, k = at(w, r, p, w.v) + at(w, r, p, w.dv), _stiffness(w, r, p, step)
         mass = ti.cast(0.0, w.real)
-        for a in ti.static(range(4)):
-            mass += r.part[p] * ti.abs(r.weight[p][a]) * w.mass[w.cell[r.cell[r.of[p]]][a]]
+        for a in range(4):
+            mass += r.share[p][a] * w.mass[w.cell[r.cell[r.of[p]]][a]]
         for c in range(n_colliders):
             force = _state(w, r, c, p, k, step, whole, end)[1]
             share = ti.cast(contact.FRICTION_TOLERANCE, w.real)
