@@ -112,9 +112,7 @@ def pig(p: np.ndarray) -> np.ndarray:
 
 def _of_pig(p: np.ndarray) -> dict[str, np.ndarray]:
     """Parts of a pig that have a colour of their own."""
-    ears = [
-        limb(p, (0.085 * s, -0.235, 0.45), (0.135 * s, -0.285, 0.545), 0.052, 0.02) for s in (-1, 1)
-    ]
+    ears = [limb(p, (0.085 * s, -0.235, 0.45), (0.135 * s, -0.285, 0.545), 0.052, 0.02) for s in (-1, 1)]
     return {"snout": egg(p, (0, -0.385, 0.335), (0.07, 0.05, 0.06)), "ears": np.minimum(*ears)}
 
 

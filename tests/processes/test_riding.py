@@ -69,29 +69,30 @@ def falling(mesh: tf.TetMesh, embed: tf.EmbeddedSurface | None, **options) -> tf
     return tf.Simulation(tf.Scene(bodies=[body], colliders=[ball, box, ground], **options))
 
 
-def depths(simulation: tf.Simulation) -> np.ndarray:
-    """How deep each point that is seen lies in any collider [m]."""
+def depths(simulation: tf.Simulation, x: np.ndarray) -> np.ndarray:
+    """How deep each point (p,3) lies in any collider [m]."""
     ball, box, ground = simulation.scene.colliders
-    x = seen(simulation)
     local = (x - box.center) @ tf.Motion(angle=(20.0,), axis=(0, 1, 0)).at(0)[0]
     to_box = (np.abs(local) - np.array(box.size) / 2).max(axis=1)
     gaps = np.linalg.norm(x - ball.center, axis=1) - ball.radius, to_box, x[:, 2] - ground.point[2]
     return -np.minimum.reduce(gaps)
 
 
-@pytest.mark.parametrize("integrator", ["backward-euler", "symplectic-euler"])
-def test_vertices_stay_outside_of_every_kind_of_collider(integrator):
-    """In a fall they go in no deeper than the nodes of the same cube do."""
+@pytest.mark.parametrize(
+    ("integrator", "most"), [("backward-euler", 1.1), pytest.param("symplectic-euler", 1.5, marks=pytest.mark.slow)]
+)
+def test_vertices_stay_outside_of_every_kind_of_collider(integrator, most):
+    """In a fall they go in no deeper than the nodes of the same cube do; a little where steps are explicit."""
     worst = []
     for embed in (None, surface(8)):
         simulation, deepest, touched = falling(CUBE, embed, integrator=integrator), 0.0, 0
         for _ in range(45):
             simulation.advance_frame()
-            deepest = max(deepest, depths(simulation).max())
+            deepest = max(deepest, depths(simulation, seen(simulation)).max())
             touched += simulation.contacts > 0
         assert touched > 10
         worst.append(deepest)
-    assert 0 < worst[1] < 1.1 * worst[0]
+    assert 0 < worst[1] < most * worst[0]
 
 
 def test_a_cage_does_not_keep_out():
@@ -99,11 +100,13 @@ def test_a_cage_does_not_keep_out():
     simulation, deepest, cage = falling(CAGE, surface(8)), 0.0, 0.0
     for _ in range(60):
         simulation.advance_frame()
-        deepest, cage = max(deepest, depths(simulation).max()), min(cage, simulation.positions[:, 2].min())
+        deepest = max(deepest, depths(simulation, seen(simulation)).max())
+        cage = max(cage, depths(simulation, simulation.positions).max())
     assert 0 < deepest < 0.02 * SIDE
-    assert cage < -0.2 - 0.05 * SIDE
+    assert cage > 0.1 * SIDE
 
 
+@pytest.mark.slow
 def test_a_body_in_balance_is_held_by_its_vertices():
     """Quasi-static: a plate lifts the surface by what the plate is lifted, and carries the weight."""
     top = tf.BoxRegion(lower=(-1, -1, 0.9 * SIDE), upper=(1, 1, 1))
@@ -118,6 +121,7 @@ def test_a_body_in_balance_is_held_by_its_vertices():
     assert pressed == pytest.approx(balance[simulation.rest_positions[:, 2] < 0.5 * SIDE, 2].sum(), rel=1e-3)
 
 
+@pytest.mark.slow
 def test_pieces_without_vertices_come_to_rest_on_their_nodes():
     """Of a tower in which only the upper half has vertices, the lower one comes off, and does not fall for ever."""
     small = surface(6)
