@@ -1,12 +1,15 @@
-"""Make the solids in this folder: `python assets/make_assets.py` writes bear.vtu, octopus.vtu and vase.vtu beside it.
+"""Make the solids in this folder: `python assets/make_assets.py` writes bear.vtu, octopus.vtu, vase.vtu and pig.ply
+beside it.
 
 Each solid is a formula, negative inside, blended from round parts; lengths are in metres, z points up, and the
 creatures look towards -y.
 """
 
+from itertools import pairwise
 from pathlib import Path
 
 import numpy as np
+import trimesh
 from scipy.interpolate import PchipInterpolator
 from scipy.spatial import cKDTree
 
@@ -94,6 +97,46 @@ def vase(p: np.ndarray) -> np.ndarray:
     return on_floor(p, blend(parts, 0.004))
 
 
+def pig(p: np.ndarray) -> np.ndarray:
+    """A pig on four short legs, with a curled tail."""
+    parts = [egg(p, (0, 0, 0.30), (0.19, 0.27, 0.185)), *_of_pig(p).values()]
+    parts += [ball(p, (0, -0.25, 0.36), 0.145)]  # head
+    for x in (-0.105, 0.105):
+        for y in (-0.15, 0.15):
+            parts.append(limb(p, (x, y, 0.22), (1.1 * x, 1.1 * y, 0.04), 0.075, 0.058))
+    curl = np.linspace(0, 1.6 * np.pi, 12)
+    joints = np.column_stack([0.045 * np.sin(curl), 0.25 + 0.03 * curl / np.pi, 0.375 + 0.045 * (1 - np.cos(curl))])
+    parts += [limb(p, a, b, 0.02, 0.02) for a, b in pairwise(joints)]
+    return on_floor(p, blend(parts, 0.012))
+
+
+def _of_pig(p: np.ndarray) -> dict[str, np.ndarray]:
+    """Parts of a pig that have a colour of their own."""
+    ears = [limb(p, (0.085 * s, -0.235, 0.45), (0.135 * s, -0.285, 0.545), 0.052, 0.02) for s in (-1, 1)]
+    return {"snout": egg(p, (0, -0.385, 0.335), (0.07, 0.05, 0.06)), "ears": np.minimum(*ears)}
+
+
+def paint_pig(p: np.ndarray) -> np.ndarray:
+    """sRGB (n, 3) in [0, 255] of points on its skin."""
+    colors = np.tile([238, 150, 165], (len(p), 1))
+    eyes = [ball(p, (0.062 * s, -0.372, 0.415), 0.024) for s in (-1, 1)]
+    nostrils = [ball(p, (0.026 * s, -0.435, 0.338), 0.015) for s in (-1, 1)]
+    for part, color in ((_of_pig(p)["snout"] - 0.006, (216, 106, 130)), (_of_pig(p)["ears"], (216, 106, 130))):
+        colors[part < 0.006] = color
+    colors[p[:, 2] < 0.035] = (110, 70, 65)  # hooves
+    colors[np.minimum.reduce(eyes) < 0] = (25, 20, 25)
+    colors[np.minimum.reduce(nostrils) < 0] = (110, 40, 60)
+    return colors
+
+
+def make_skin(formula, paint, spacing: float) -> trimesh.Trimesh:
+    """The painted surface of a formula, as fine as `spacing` [m]."""
+    mesh = TetMesh.from_implicit(formula, (-0.7, -0.7, -0.1), (0.7, 0.7, 0.95), spacing)
+    nodes, triangles = np.unique(mesh.boundary(), return_inverse=True)
+    points = mesh.points[nodes]
+    return trimesh.Trimesh(points, triangles.reshape(-1, 3), vertex_colors=paint(points), process=False)
+
+
 def _smooth(x: list[float], y: list[float]) -> np.ndarray:
     """A smooth curve (600, 2) through points of a plane."""
     knots = np.concatenate([[0], np.cumsum(np.hypot(np.diff(x), np.diff(y)))])
@@ -116,3 +159,6 @@ if __name__ == "__main__":
         mesh = make(formula)
         mesh.write(Path(__file__).parent / f"{formula.__name__}.vtu")
         print(f"{formula.__name__}\n{report(mesh)}\n")
+    skin = make_skin(pig, paint_pig, 0.0265)
+    skin.export(Path(__file__).parent / "pig.ply")
+    print(f"pig: {len(skin.faces)} triangles")

@@ -7,17 +7,16 @@ from dataclasses import replace
 
 import numpy as np
 
-from taichifem import carrying, transfer
 from taichifem.description import Collider, Material, check
 from taichifem.errors import InputError
 from taichifem.hands import Hand, Hands
-from taichifem.meeting_bodies import MeetingBodies
+from taichifem.riding_bodies import RidingBodies
 
 MOST_NODES = 16
 """That one hand holds: the nearest ones."""
 
 
-class InteractiveBodies(MeetingBodies):
+class InteractiveBodies(RidingBodies):
     """Bodies with hands on them. What is done acts at the next step; nothing recompiles."""
 
     @property
@@ -57,11 +56,10 @@ class InteractiveBodies(MeetingBodies):
             raise InputError(f"there is room for {room} colliders here: make a new simulation for more")
         if not kept:
             same = [k < min(len(before), len(colliders)) and before[k] == colliders[k] for k in range(room)]
-            with self._kernels():
-                contacts = carrying.read_contacts(self._world, room, self._counts.nodes)
-                for values in contacts.values():
-                    values[~np.array(same)] = 0
-                carrying.write_contacts(self._world, contacts)
+            contacts = self._read_contacts(room)
+            for values in contacts.values():
+                values[~np.array(same)] = 0
+            self._write_contacts(contacts)
         self.scene = replace(self.scene, colliders=tuple(colliders))
         self._counts.colliders = len(colliders)
         self._surroundings.take(self.scene)
@@ -69,9 +67,7 @@ class InteractiveBodies(MeetingBodies):
     def force_on_ball(self, collider: int, time: float) -> np.ndarray:
         """Force (3,) [N] with which bodies pressed, in the step that ended at `time` [s], on the sphere `collider`."""
         ball, rotation, offset = self._poses(time)[collider]
-        with self._kernels():
-            pressed = carrying.read_contacts(self._world, collider + 1, self._counts.nodes)["pressed"][collider]
-            x = transfer.read(self._world, self._world.x, self._counts.nodes)
+        x, pressed = self._pressed_points(collider)
         met = np.flatnonzero(pressed > 0)
         away = x[met] - (rotation @ np.asarray(ball.center) + offset)
         away /= np.maximum(np.linalg.norm(away, axis=1, keepdims=True), 1e-12)

@@ -9,7 +9,7 @@ from dataclasses import asdict, replace
 
 import numpy as np
 
-from taichifem import carrying, checkpoint, transfer
+from taichifem import checkpoint, transfer
 from taichifem.clock import Clock
 from taichifem.description import Collider, Load, Material, Scene
 from taichifem.errors import Diverged, InputError
@@ -130,6 +130,7 @@ class Simulation(InteractiveBodies):
             options=Options(**chosen | options),
             timer=self._timer,
             plan=plan,
+            riding=self._riding,
             follow=self._follow if self._loading.follows else None,
             due=self._due,
             # Methods that look back start anew where a load jumps: they would smear it over the steps around.
@@ -191,8 +192,7 @@ class Simulation(InteractiveBodies):
         self.set_positions(positions)
         self._put_on(share)
         if contacts:
-            with self._kernels():
-                carrying.write_contacts(self._world, contacts)
+            self._write_contacts(contacts)
 
     def _put_on(self, share: float) -> None:
         """Put on the part `share` of all loads and motions."""
@@ -291,16 +291,11 @@ class Simulation(InteractiveBodies):
 
     @property
     def contacts(self) -> int:
-        """Contacts between nodes and colliders after the last step."""
-        if not self._counts.colliders:
-            return 0
-        return int((self._contact_state()["touching"] > 0).sum())
+        """Contacts of nodes and embedded vertices with colliders after the last step."""
+        return sum(int((v > 0).sum()) for name, v in self._contact_state().items() if name.endswith("touching"))
 
     def _contact_state(self) -> dict[str, np.ndarray]:
-        if not self._counts.colliders:
-            return {}
-        with self._kernels():
-            return carrying.read_contacts(self._world, self._counts.colliders, self._counts.nodes)
+        return self._read_contacts(self._counts.colliders) if self._counts.colliders else {}
 
     @property
     def stats(self) -> Stats:
@@ -335,7 +330,7 @@ class Simulation(InteractiveBodies):
         w = self._world
         with self._kernels():
             arrays = {name: transfer.read(w, getattr(w, name), count) for name, count in self._state().items()}
-            arrays |= carrying.read_contacts(w, self._counts.colliders, self._counts.nodes)
+        arrays |= self._read_contacts(self._counts.colliders)
         arrays |= {"cells": self.cells, "origins": self.origins, "tips": self.crack_tips}
         header = {"scene": self._fingerprint(), "clock": asdict(self._clock), "fresh": self._fresh, "due": self._due}
         return arrays, header
@@ -368,7 +363,7 @@ class Simulation(InteractiveBodies):
             for name in self._state():
                 if name in arrays:
                     transfer.write(w, getattr(w, name), arrays[name])
-            carrying.write_contacts(w, arrays)
+        self._write_contacts(arrays)
         self._clock, self._fresh, self._due = Clock(**header["clock"]), not same or bool(header["fresh"]), header["due"]
         if not same and self._clock.substep == 0:
             self._clock.substeps = self.scene.substeps or 1

@@ -52,6 +52,7 @@ def _fill_mesh(w: ti.template(), rest: _array(), cells: _array(), incident_start
     for i in range(rest.shape[0]):
         for k in ti.static(range(3)):
             w.rest[i][k] = rest[i, k]
+        w.shielded[i] = 0
     for e in range(cells.shape[0]):
         for a in ti.static(range(w.corners)):
             w.cell[e][a] = cells[e, a]

@@ -82,6 +82,7 @@ class Counts:
     flying: int = 0  # bodies that no pin holds
     colliders: int = 0
     meetings: int = 0  # springs between pieces
+    riding: int = 0  # embedded vertices near colliders
     held: int = 0
     pulled: int = 0
     sprung: bool = True  # may some springs of handles or contact be left from the last step?
@@ -237,6 +238,7 @@ class World:
         self.collider_velocity, self.collider_spin = self._vector(k, 3), self._vector(k, 3)
         # A node's own stiffness at rest [N/m], and the mass of its piece [kg]: they size its contact springs.
         self.contact_stiffness, self.piece_mass = self._scalar(c.nodes), self._scalar(c.nodes)
+        self.shielded = self._scalar(c.nodes, ti.i32)  # 1 where an embedded surface touches in the node's place
         self.slip = ti.Vector.field(3, self.real)
         self.pressed = ti.field(self.real)  # normal force that friction was last set for [N]
         self.touching = ti.field(ti.i32)

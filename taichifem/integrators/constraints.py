@@ -24,14 +24,16 @@ def settle(
     solve: given the number of the pass and its slack.
     weight: [m/s^2] a force of this times the mass counts as one that matters.
     """
-    w, n, colliders = step.w, step.counts.nodes, step.counts.colliders
+    colliders = step.counts.colliders
     renewals, slack = 0, SLACK if colliders else 1.0
+    if step.riding is not None:
+        step.riding.begin()
     for passes in range(1, CONTACT_PASSES + 1):
         with step.timer.phase("contact"):
             changed = springs(step, h)
             if passes > 1 and not changed:
                 renewals += 1
-                if renewals > FRICTION_RENEWALS or not contact.press(w, n, colliders, h, step.dt, weight):
+                if renewals > FRICTION_RENEWALS or not _press(step, h, weight):
                     if slack == 1:
                         break
                     slack = 1.0
@@ -59,7 +61,14 @@ def springs(step: Step, h: float) -> int:
     holding.pull(w, counts.pulled, h)
     if counts.meetings:
         meeting_elements.push(w, counts.meetings, h)
-    return contact.touch(w, counts.nodes, counts.colliders, h, step.dt) if counts.colliders else 0
+    changed = contact.touch(w, counts.nodes, counts.colliders, h, step.dt) if counts.colliders else 0
+    return changed + (step.riding.touch(w, counts, h, step.dt) if step.riding is not None else 0)
+
+
+def _press(step: Step, h: float, weight: float) -> int:
+    """Renew the normal forces that limit friction; for how many contacts that matters."""
+    changed = contact.press(step.w, step.counts.nodes, step.counts.colliders, h, step.dt, weight)
+    return changed + (step.riding.press(step.w, step.counts, h, step.dt, weight) if step.riding is not None else 0)
 
 
 def friction(step: Step, h: float) -> None:
@@ -67,3 +76,5 @@ def friction(step: Step, h: float) -> None:
     with step.timer.phase("contact"):
         if step.counts.colliders:
             contact.slide(step.w, step.counts.nodes, step.counts.colliders, h, step.dt)
+        if step.riding is not None:
+            step.riding.slide(step.w, step.counts, h, step.dt)

@@ -126,8 +126,8 @@ def solve(step: Step, *, h: float, newton: int, inertia: bool = True) -> StepRep
     newton: most linearisations; 1 is the linearly implicit method.
     """
     w, n = step.w, step.counts.nodes
-    # What presses on a body from another one stands in the matrix: such bodies do not fly.
-    flies = inertia and not step.counts.meetings
+    # What presses on a body from another one, or on what rides in it, stands in the matrix: such bodies do not fly.
+    flies = inertia and not (step.counts.meetings or step.counts.riding)
     counts = step.counts if flies else replace(step.counts, flying=0)
     weight = float(np.linalg.norm(step.gravity)) * h if inertia else ALWAYS
     noise = float(np.finfo(np.float32 if w.precision == "f32" else np.float64).eps) / h

@@ -9,6 +9,7 @@ import numpy as np
 
 from taichifem.laws import Laws
 from taichifem.linear_algebra.plan import Plan
+from taichifem.processes.riding import Riding
 from taichifem.timing import PhaseTimer
 from taichifem.world import Counts, World
 
@@ -57,6 +58,7 @@ class Step:
     """A step of `dt` [s]: the world, where its poses and colliders stand at the end of it, and how to solve.
 
     gravity: (3,) [m/s^2].  plan: of the linear solver; explicit methods need none.
+    riding: embedded vertices that meet colliders, where there are any.
     follow: brings loads that follow the surface up to date, where there are any.
     due: time over which plastic flow is due [s]: the last step has moved the nodes, but nothing has flowed since.
     fresh: there is no past step to go on from.  damped: has some material stiffness damping?
@@ -70,6 +72,7 @@ class Step:
     options: Options
     timer: PhaseTimer
     plan: Plan | None
+    riding: Riding | None = None
     follow: Callable[[], None] | None = None
     due: float = 0.0
     fresh: bool = True

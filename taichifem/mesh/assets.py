@@ -1,4 +1,4 @@
-"""Where the solids that come with the package lie."""
+"""Where the solids and surfaces that come with the package lie."""
 
 from pathlib import Path
 
@@ -7,6 +7,8 @@ from taichifem.errors import InputError
 PACKAGE = Path(__file__).resolve().parents[1]
 FOLDERS = (PACKAGE / "assets", PACKAGE.parent / "assets")  # installed; in a checkout
 PREFIX = "asset:"
+KINDS = (".vtu", ".ply")
+"""Solids, and surfaces to embed."""
 
 
 def asset_names() -> list[str]:
@@ -15,13 +17,12 @@ def asset_names() -> list[str]:
 
 
 def asset_path(name: str) -> Path:
-    """The file of the solid with that name, such as "bear".
+    """The file of the solid or surface with that name, such as "bear".
 
     Raises:
         InputError: there is none; the message lists those that exist.
     """
-    for folder in FOLDERS:
-        file = folder / f"{name}.vtu"
-        if name in asset_names() and file.is_file():
-            return file
-    raise InputError(f"there is no asset {name!r}; choose from {', '.join(asset_names()) or 'none installed'}")
+    files = {file.stem: file for folder in reversed(FOLDERS) for kind in KINDS for file in folder.glob(f"*{kind}")}
+    if name not in files:
+        raise InputError(f"there is no asset {name!r}; choose from {', '.join(sorted(files)) or 'none installed'}")
+    return files[name]

@@ -27,12 +27,16 @@ CHUNK = 2_000_000
 
 @dataclass(frozen=True, eq=False)
 class EmbeddedSurface:
-    """points (p,3) [m], triangles (k,3), colors (p,3) sRGB in [0, 1] or None; file: where it came from."""
+    """points (p,3) [m], triangles (k,3), colors (p,3) sRGB in [0, 1] or None; file: where it came from.
+
+    uv: (p,2) places in a texture, or None.
+    """
 
     points: np.ndarray
     triangles: np.ndarray
     colors: np.ndarray | None = None
     file: str | None = None
+    uv: np.ndarray | None = None
 
     @classmethod
     def from_file(cls, path: str | PathLike) -> EmbeddedSurface:
@@ -42,7 +46,7 @@ class EmbeddedSurface:
         """
         content = reading.read(path, surface_wanted=True)
         if isinstance(content, reading.Surface):
-            return cls(content.points, content.triangles, content.colors, str(path))
+            return cls(content.points, content.triangles, content.colors, str(path), content.uv)
         triangles, _ = boundary_faces(np.asarray(content.cells))
         nodes, triangles = np.unique(triangles, return_inverse=True)
         return cls(np.asarray(content.points)[nodes], triangles.reshape(-1, 3), None, str(path))

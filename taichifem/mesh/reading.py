@@ -34,11 +34,13 @@ class Solid:
 
 @dataclass(frozen=True)
 class Surface:
-    """What a surface file holds: points (n, 3), triangles (k, 3), colours of the points (n, 3) in [0, 1] or None."""
+    """What a surface file holds: points (n, 3), triangles (k, 3), and of the points colours (n, 3) in [0, 1] or None,
+    places in a texture (n, 2) or None."""
 
     points: np.ndarray
     triangles: np.ndarray
     colors: np.ndarray | None = None
+    uv: np.ndarray | None = None
 
 
 def read(path: str | PathLike, surface_wanted: bool = False) -> Solid | Surface:
@@ -156,4 +158,6 @@ def _read_surface(path: Path) -> Surface:
     colors = None
     if getattr(mesh.visual, "kind", None) == "vertex":
         colors = np.asarray(mesh.visual.vertex_colors, float)[:, :3] / 255
-    return Surface(np.asarray(mesh.vertices, float), np.asarray(triangles), colors)
+    uv = getattr(mesh.visual, "uv", None)
+    uv = None if uv is None or len(uv) != len(mesh.vertices) else np.asarray(uv, float)[:, :2]
+    return Surface(np.asarray(mesh.vertices, float), np.asarray(triangles), colors, uv)

@@ -14,7 +14,8 @@ import numpy as np
 from taichifem.description import check
 from taichifem.errors import InputError
 from taichifem.files import replacing
-from taichifem.output.skin import Skin
+from taichifem.output.colors import body_colors
+from taichifem.output.skin import Seen, Skin
 
 
 def open_export(directory: str | os.PathLike, format: str, simulation: Any) -> MeshSequence:
@@ -100,11 +101,33 @@ def write_vtu(path: Path, simulation: Any, **point_data: np.ndarray) -> None:
 
 
 def _surface(simulation: Any) -> meshio.Mesh:
-    """The surface that is seen, with only its own points, in the 32 bits that viewers of these formats read."""
+    """The surface that is seen, with only its own points, in the 32 bits that viewers of these formats read.
+
+    Where embedded surfaces have colours or places in a texture, so has it: `red`, `green`, `blue`, `s`, `t`.
+    """
     seen = Skin().of(simulation)
     nodes, triangles = np.unique(seen.triangles, return_inverse=True)
     points = seen.follow(simulation.positions)[nodes].astype(np.float32)
-    return meshio.Mesh(points, [("triangle", triangles.reshape(-1, 3).astype(np.int32))])
+    return meshio.Mesh(
+        points, [("triangle", triangles.reshape(-1, 3).astype(np.int32))], _paint(seen, simulation, nodes)
+    )
+
+
+def _paint(seen: Seen, simulation: Any, nodes: np.ndarray) -> dict[str, np.ndarray]:
+    """Colours and places in a texture of some points; what has none is coloured as its body, and lies at (0, 0)."""
+    found: dict[str, np.ndarray] = {}
+    if seen.paint is None:
+        return found
+    paint = seen.paint[nodes]
+    if np.isfinite(paint[:, :3]).any():
+        body = np.zeros(len(seen.paint), dtype=int)
+        body[seen.triangles] = seen.bodies[:, None]
+        plain = body_colors(len(simulation.scene.bodies), simulation.scene.view.colors)[body[nodes]]
+        shades = np.where(np.isfinite(paint[:, :3]), paint[:, :3], plain)
+        found |= dict(zip(("red", "green", "blue"), np.rint(255 * shades).astype(np.uint8).T.copy(), strict=True))
+    if np.isfinite(paint[:, 3:]).any():
+        found |= dict(zip(("s", "t"), np.nan_to_num(paint[:, 3:]).astype(np.float32).T.copy(), strict=True))
+    return found
 
 
 def _ply(path: Path, simulation: Any) -> None:
@@ -112,7 +135,18 @@ def _ply(path: Path, simulation: Any) -> None:
 
 
 def _obj(path: Path, simulation: Any) -> None:
-    _surface(simulation).write(path, file_format="obj")
+    """Points with colours behind them, and corners that name their place in the texture: meshio writes neither."""
+    mesh = _surface(simulation)
+    points, data, corners = mesh.points, mesh.point_data, mesh.cells_dict["triangle"] + 1
+    if "red" in data:
+        points = np.column_stack([points, *(data[name] / 255 for name in ("red", "green", "blue"))])
+    with path.open("w", encoding="utf-8") as file:
+        np.savetxt(file, points, fmt="v" + " %.9g" * points.shape[1])
+        if "s" in data:
+            np.savetxt(file, np.column_stack([data["s"], data["t"]]), fmt="vt %.9g %.9g")
+            np.savetxt(file, np.repeat(corners, 2, axis=1), fmt="f %d/%d %d/%d %d/%d")
+        else:
+            np.savetxt(file, corners, fmt="f %d %d %d")
 
 
 def _npz(path: Path, simulation: Any) -> None:

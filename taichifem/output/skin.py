@@ -19,6 +19,7 @@ class Seen:
     riders: shares (p,n) of the nodes in those points, or None.  nodes (n+p,): the node that moves most like each point,
     or None where all are nodes.  bodies, pieces, cracked: of each triangle (k,).
     colors (k,3) sRGB of its own, NaN where the surface has none.
+    paint (n+p,5): sRGB and place in a texture of each point, NaN where the surface has none; None: no surface has any.
     """
 
     triangles: np.ndarray
@@ -28,6 +29,7 @@ class Seen:
     pieces: np.ndarray
     cracked: np.ndarray
     colors: np.ndarray
+    paint: np.ndarray | None = None
 
     def follow(self, values: np.ndarray) -> np.ndarray:
         """Values of all points, from those of the nodes (n,) or (n,3)."""
@@ -62,6 +64,7 @@ class Skin:
         parts = [(surface[shown], bodies[shown], np.asarray(simulation.surface_pieces)[shown], cracked[shown])]
         colors, elements, weights = [np.full((shown.sum(), 3), np.nan)], [], []
         first = len(simulation.rest_positions)
+        paint = [np.full((first, 5), np.nan)]
         for rider in self._riding:
             triangles, element, weight = rider.corners(cells, np.asarray(simulation.cell_pieces))
             pieces = np.asarray(simulation.cell_pieces)[rider.home]
@@ -69,14 +72,16 @@ class Skin:
                 (triangles + first, np.full(len(triangles), rider.body), pieces, np.zeros(len(triangles), bool))
             )
             colors.append(rider.colors)
+            paint.append(rider.paint[rider.vertices(triangles)])
             elements.append(element), weights.append(weight)
             first += len(element)
             opened = cracked & (bodies == rider.body)
             if opened.any():
-                triangles, element, weight = rider.crack(surface[opened], cells)
-                pieces = np.asarray(simulation.surface_pieces)[opened]
-                parts.append((triangles + first, bodies[opened], pieces, np.ones(len(triangles), bool)))
+                triangles, element, weight, kept = rider.crack(surface[opened], cells)
+                pieces = np.asarray(simulation.surface_pieces)[opened][kept]
+                parts.append((triangles + first, bodies[opened][kept], pieces, np.ones(len(triangles), bool)))
                 colors.append(np.full((len(triangles), 3), np.nan))
+                paint.append(np.full((len(element), 5), np.nan))
                 elements.append(element), weights.append(weight)
                 first += len(element)
         riding = Embedding(np.concatenate(elements), np.concatenate(weights))
@@ -85,7 +90,9 @@ class Skin:
         nodes = np.concatenate([np.arange(n), cells[riding.element, main]])
         columns = (np.concatenate(column) for column in zip(*parts, strict=True))
         triangles, bodies, pieces, cracked = columns
-        return Seen(triangles.astype(np.int32), riders, nodes, bodies, pieces, cracked, np.concatenate(colors))
+        colors, paint = np.concatenate(colors), np.concatenate(paint)
+        painted = paint if np.isfinite(paint).any() else None
+        return Seen(triangles.astype(np.int32), riders, nodes, bodies, pieces, cracked, colors, painted)
 
 
 def _plain(simulation: Any, with_pieces: bool) -> Seen:
@@ -116,7 +123,9 @@ class _Rider:
         self._own, self._weights = body.embedding.element, body.embedding.weights
         self._home = embed(self.points[self.triangles].mean(axis=1), self._nodes, self._whole).element
         self.home = cells[self._home]
-        shades = body.embed.colors
+        shades, uv = body.embed.colors, body.embed.uv
+        self.paint = np.full((len(self.points), 5), np.nan)
+        self.paint[:, :3], self.paint[:, 3:] = np.nan if shades is None else shades, np.nan if uv is None else uv
         self.colors = (
             np.full((len(self.triangles), 3), np.nan) if shades is None else shades[self.triangles].mean(axis=1)
         )
@@ -125,6 +134,12 @@ class _Rider:
         corners = self._nodes[self._whole[element]]
         edges = (corners[:, 1:] - corners[:, :1]).transpose(0, 2, 1)
         return barycentric(points, corners[:, 0], np.linalg.inv(edges))
+
+    def vertices(self, triangles: np.ndarray) -> np.ndarray:
+        """Of which vertex of the surface each riding point of `corners` is (or is a copy)."""
+        found = np.arange(max(len(self.points), int(triangles.max()) + 1))
+        found[triangles] = self.triangles
+        return found
 
     def corners(self, cells: np.ndarray, pieces: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
         """Triangles (k,3) of riding points, and those points' elements and weights.
@@ -145,17 +160,30 @@ class _Rider:
         weights = np.concatenate([self._weights, self._in(self.points[vertices], carriers)])
         return triangles.reshape(k, 3), self._of[element], weights
 
-    def crack(self, faces: np.ndarray, cells: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-        """Faces (f,3) that cracks opened, drawn in where they would stick out of the surface."""
+    def _outside(self, points: np.ndarray) -> np.ndarray:
+        return winding_number(points, self.points, self.triangles) < 0.5
+
+    def crack(self, faces: np.ndarray, cells: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
+        """Of the faces (f,3) that cracks opened those inside of the surface, drawn in where they would stick out.
+
+        Corners (k,3) among riding points, those points' elements and weights, and which faces (f,) these are.
+        """
         boundary, owner = boundary_faces(cells[self._of])
         place = {frozenset(face): e for face, e in zip(boundary.tolist(), owner.tolist(), strict=True)}
         element = np.repeat([place[frozenset(face)] for face in faces.tolist()], 3)
         corner = (cells[self._of][element] == faces.reshape(-1, 1)).argmax(axis=1)
         at = self._nodes[self._whole[element, corner]]
-        outside = winding_number(at, self.points, self.triangles) < 0.5
+        outside = self._outside(at)
+        triangle = at.reshape(-1, 3, 3)
+        middles = 0.5 * (triangle + np.roll(triangle, 1, axis=1))
+        between = np.concatenate([middles, triangle.mean(axis=1, keepdims=True)], axis=1).reshape(-1, 3)
+        inside = ~np.concatenate([outside.reshape(-1, 3), self._outside(between).reshape(-1, 4)], axis=1)
+        kept = inside.any(axis=1)
+        corners = np.repeat(kept, 3)
+        at, element, outside = at[corners], element[corners], outside[corners]
         moved, corners = at.copy(), self.points[self.triangles]
         for i in np.flatnonzero(outside):
             nearest = closest_point(at[i], corners)
             moved[i] = nearest[((nearest - at[i]) ** 2).sum(axis=1).argmin()]
         weights = self._in(moved, element)
-        return np.arange(3 * len(faces)).reshape(-1, 3), self._of[element], weights
+        return np.arange(len(at)).reshape(-1, 3), self._of[element], weights, kept

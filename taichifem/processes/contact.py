@@ -20,8 +20,8 @@ FRICTION_TOLERANCE = 0.03
 
 
 @ti.func
-def _gap(w: ti.template(), c: ti.i32, start, end):
-    """How far [m] a node that moves from `start` to `end` ends outside of collider c, and the outward normal."""
+def gap(w: ti.template(), c: ti.i32, start, end):
+    """How far [m] a point that moves from `start` to `end` ends outside of collider c, and the outward normal."""
     R = w.collider_rotation[c]
     p0 = w.collider_rotation0[c].transpose() @ (start - w.collider_center0[c])
     p1 = R.transpose() @ (end - w.collider_center[c])
@@ -49,22 +49,54 @@ def stiffness(w: ti.template(), i: ti.i32, h):
 
 
 @ti.func
-def _state(w: ti.template(), c: ti.i32, i: ti.i32, h, dt, velocity):
-    """Touching or not, normal force [N], normal, and stretch of the friction spring, at the end velocity."""
-    position = w.base_x[i] + h * velocity
-    distance, normal = _gap(w, c, w.x0[i], position)
+def state_of(w: ti.template(), c: ti.i32, start, base, velocity, k, slip, pressed, h, dt):
+    """Touching or not, normal force [N], normal, and stretch of the friction spring of a point, at its end velocity.
+
+    start: where it was.  base: from which h times the velocity leads to the end.  k: stiffness of its springs [N/m].
+    slip, pressed: stretch and normal force of the friction spring so far.
+    """
+    position = base + h * velocity
+    distance, normal = gap(w, c, start, position)
     state = NONE
     force = ti.cast(0.0, w.real)
     stretch = ti.Vector.zero(w.real, 3)
     if distance < 0:
-        k = stiffness(w, i, h)
         force = -k * distance
         surface = w.collider_velocity[c] + w.collider_spin[c].cross(position - w.collider_center[c])
-        stretch = w.slip[c, i] + ((w.base_x[i] - w.x0[i]) + h * velocity - dt * surface)
+        stretch = slip + ((base - start) + h * velocity - dt * surface)
         if ti.static(w.d == 2):
             stretch[1] = 0.0
         stretch -= stretch.dot(normal) * normal
-        state = SLIPS if k * stretch.norm() > w.collider_friction[c] * w.pressed[c, i] else STICKS
+        state = SLIPS if k * stretch.norm() > w.collider_friction[c] * pressed else STICKS
+    return state, force, normal, stretch
+
+
+@ti.func
+def springs_of(w: ti.template(), c: ti.i32, state, normal, stretch, k, pressed):
+    """Stiffness (3,3) of both springs of a point that touches, and that of the friction spring alone [N/m]."""
+    # Where it slips, a spring as soft as gives the force mu N: it opposes the motion, and cannot
+    # throw the point back. With N held fixed these springs majorise the friction potential, which is
+    # convex, so solving again descends.
+    side = k
+    if state == SLIPS:
+        side = w.collider_friction[c] * pressed / stretch.norm()
+    springs = (k - side) * normal.outer_product(normal) + side * ti.Matrix.identity(w.real, 3)
+    if ti.static(w.d == 2):
+        springs[1, 1] = 0.0
+    return springs, side
+
+
+@ti.func
+def _state(w: ti.template(), c: ti.i32, i: ti.i32, h, dt, velocity):
+    """The same of a node; none where an embedded surface touches in its place."""
+    k = stiffness(w, i, h)
+    state, force, normal, stretch = state_of(
+        w, c, w.x0[i], w.base_x[i], velocity, k, w.slip[c, i], w.pressed[c, i], h, dt
+    )
+    if w.shielded[i]:
+        state = NONE
+        force = 0.0
+        stretch = ti.Vector.zero(w.real, 3)
     return state, force, normal, stretch
 
 
@@ -85,16 +117,7 @@ def touch(w: ti.template(), n: ti.i32, n_colliders: ti.i32, h: ti.f64, dt: ti.f6
                 changed += 1
             if state != NONE:
                 k = stiffness(w, i, step)
-                # Where it slips, a spring as soft as gives the force mu N: it opposes the motion, and cannot
-                # throw the node back. With N held fixed these springs majorise the friction potential, which is
-                # convex, so solving again descends.
-                side = k
-                if state == SLIPS:
-                    side = w.collider_friction[c] * w.pressed[c, i] / stretch.norm()
-                along = normal.outer_product(normal)
-                springs = (k - side) * along + side * ti.Matrix.identity(w.real, 3)
-                if ti.static(w.d == 2):
-                    springs[1, 1] = 0.0
+                springs, side = springs_of(w, c, state, normal, stretch, k, w.pressed[c, i])
                 w.sprung[i] = 1
                 w.spring[i] += step * step * springs
                 # Both forces are written for dv = 0: what `dv` adds to them stands in the matrix.

@@ -81,5 +81,5 @@ def test_assets_stand_on_the_floor_and_are_good_meshes(name):
 def test_unknown_assets_are_refused_with_the_list():
     assert asset_names() == ["bear", "octopus", "vase"]
     for name in ("cat", "../pyproject", ""):
-        with pytest.raises(InputError, match="choose from bear, octopus, vase"):
+        with pytest.raises(InputError, match="choose from bear, octopus, pig, vase"):
             TetMesh.from_file(f"asset:{name}")

@@ -2,8 +2,10 @@
 
 from dataclasses import replace
 
+import meshio
 import numpy as np
 import pytest
+from scipy.spatial import cKDTree
 
 import taichifem as tf
 from taichifem.output.export import open_export
@@ -49,6 +51,51 @@ def test_surfaces_are_exported_in_place_of_the_cage(tmp_path, format):
     np.testing.assert_allclose(
         found.bounds, [BODY.placed(BEAR.points).min(0), BODY.placed(BEAR.points).max(0)], atol=1e-5
     )
+
+
+@pytest.mark.parametrize("format", ["obj", "ply"])
+def test_colours_and_places_in_a_texture_are_exported(tmp_path, format):
+    """Of the surface's own; what has none has its body's colour. The file is read by an independent library."""
+    rng = np.random.default_rng(0)
+    colors, uv = rng.integers(0, 256, BEAR.points.shape) / 255, rng.random((len(BEAR.points), 2))
+    scene = tf.Scene(bodies=[replace(BODY, embed=replace(BEAR, colors=colors, uv=uv)), tf.Body(mesh=tf.TetMesh.bar())])
+    simulation = tf.Simulation(scene)
+    export = open_export(tmp_path, format, simulation)
+    export.write(simulation)
+    found = tf.EmbeddedSurface.from_file(str(export.files[0]))
+    distance, own = cKDTree(found.points).query(BODY.placed(BEAR.points))
+    assert distance.max() < 1e-5
+    if format == "ply":
+        words = meshio.read(export.files[0]).point_data
+        shades = np.column_stack([words[name] for name in ("red", "green", "blue")])[own]
+        np.testing.assert_array_equal(shades, np.rint(255 * colors))
+        places = np.column_stack([words["s"], words["t"]])[own]
+    else:
+        lines = [line.split() for line in export.files[0].read_text().splitlines()]
+        rows = np.array([line[1:] for line in lines if line[0] == "v"], float)
+        _, own = cKDTree(rows[:, :3]).query(BODY.placed(BEAR.points))
+        np.testing.assert_allclose(rows[own, 3:], colors, atol=1e-6)
+        places = np.array([line[1:] for line in lines if line[0] == "vt"], float)[own]
+        _, own = cKDTree(found.points).query(BODY.placed(BEAR.points))
+        np.testing.assert_allclose(found.uv[own], uv, atol=1e-6)
+    np.testing.assert_allclose(places, uv, atol=1e-6)
+
+
+def test_copies_at_a_crack_keep_their_colour():
+    painted = replace(BEAR, colors=np.tile([0.1, 0.8, 0.3], (len(BEAR.points), 1)))
+    material = tf.Material(youngs=1e6, fracture=tf.Fracture(toughness=1e4))
+    high = tf.Pin(
+        region=tf.BoxRegion(lower=(-9, -9, 1.6), upper=(9, 9, 9)),
+        motion=tf.Motion(times=(0, 0.3), translation=[(0, 0, 0), (0, 0, 1.0)]),
+    )
+    low = tf.BoxRegion(lower=(-9, -9, -9), upper=(9, 9, 1.25))
+    body = replace(BODY, embed=painted, material=material, pins=[low, high])
+    simulation = tf.Simulation(tf.Scene(bodies=[body], gravity=(0, 0, 0)))
+    simulation.advance(seconds=0.5)
+    seen = Skin().of(simulation)
+    own = np.unique(seen.triangles[~seen.cracked])
+    assert len(own) > len(BEAR.points)
+    np.testing.assert_allclose(seen.paint[own, :3], np.tile([0.1, 0.8, 0.3], (len(own), 1)))
 
 
 def test_triangles_go_with_the_piece_that_holds_them():
