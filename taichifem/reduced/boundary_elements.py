@@ -7,7 +7,7 @@ where they are reactions, so that edges at which given tractions jump are no tro
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
@@ -100,6 +100,15 @@ class BoundaryElements:
         balance = np.einsum("nm,nar->rma", mass, motions).reshape(6, -1)
         return Compliance(self._inverse @ self.G, self.rigid, balance)
 
+    def stiffen(self, youngs: float) -> None:
+        """Be of another Young's modulus [Pa]: tractions do less by as much, and nothing is integrated again."""
+        softer = self.youngs / youngs
+        self.youngs, self.mu = youngs, self.mu / softer
+        self.G *= softer
+        self.G_faces *= softer
+        self.face_compliance *= softer
+        self.compliance = replace(self.compliance, matrix=softer * self.compliance.matrix)
+
     def resultant(self, tractions: np.ndarray) -> np.ndarray:
         """What tractions (k,3) [Pa] on the triangles do to the rigid motions (6,)."""
         middle = self.rigid.reshape(-1, 3, 6)[self.triangles].mean(axis=1)
@@ -183,9 +192,17 @@ class Inside:
     by_face: np.ndarray
 
     def displacement(self, u: np.ndarray, around: np.ndarray, faces: np.ndarray) -> np.ndarray:
-        """(m,3) [m] for displacements (n,3) and tractions (n,3), (k,3)."""
-        found = self.by_displacement @ u.ravel() + self.by_vertex @ around.ravel()
-        return (found + self.by_face @ faces.ravel()).reshape(-1, 3)
+        """(m,3) [m] for displacements (n,3) and tractions (n,3), (k,3), of which many are zero."""
+        found = self.by_displacement @ u.ravel()
+        for matrix, tractions in ((self.by_vertex, around.ravel()), (self.by_face, faces.ravel())):
+            acts = np.flatnonzero(tractions)
+            if len(acts):
+                found += matrix[:, acts] @ tractions[acts] if 4 * len(acts) < len(tractions) else matrix @ tractions
+        return found.reshape(-1, 3)
+
+    def stiffened(self, softer: float) -> Inside:
+        """Of a body in which tractions do `softer` times as much."""
+        return Inside(self.by_displacement, softer * self.by_vertex, softer * self.by_face)
 
 
 def _add_columns(target: np.ndarray, to: np.ndarray, values: np.ndarray) -> None:

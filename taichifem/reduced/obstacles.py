@@ -81,6 +81,17 @@ class Obstacles:
                 _gaps(np.ascontiguousarray(table), *ends, gaps, normals)
         return gaps, normals
 
+    def standing(
+        self, table: np.ndarray, which: np.ndarray, points: np.ndarray, gaps: np.ndarray, normals: np.ndarray
+    ) -> tuple[np.ndarray, np.ndarray]:
+        """Gaps (m,) and normals (m,3) of points (m,3) that touch the colliders `which` (m,): from balls, those where
+        they are and not where they came in, which is the same for flat faces, unless the middle lies between."""
+        arm = points - table[which, 5:8]
+        away = np.linalg.norm(arm, axis=1)
+        own = arm / np.maximum(away, 1e-300)[:, None]
+        ball = (table[which, 0] == collision.SPHERE) & ((own * normals).sum(axis=1) > 0.5)
+        return np.where(ball, away - table[which, 2], gaps), np.where(ball[:, None], own, normals)
+
     def carried(self, table: np.ndarray, which: np.ndarray, points: np.ndarray, dt: float) -> np.ndarray:
         """How far (n,3) [m] the colliders `which` (n,) take points (n,3) along that stick to them, over dt [s]."""
         rows = table[which]
