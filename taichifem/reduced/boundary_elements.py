@@ -179,13 +179,14 @@ class BoundaryElements:
         # Inside a body that is shifted, all is.
         excess = by_displacement.sum(axis=2) - np.eye(3)
         by_displacement -= excess[:, :, None, :] / n
-        return Inside(*(block.reshape(3 * m, -1) for block in (by_displacement, by_vertex, by_face)))
+        follows = by_displacement.reshape(3 * m, -1)
+        return Inside(follows, *(np.ascontiguousarray(block.reshape(3 * m, -1).T) for block in (by_vertex, by_face)))
 
 
 @dataclass(frozen=True)
 class Inside:
-    """Displacement of m places by that of the n vertices (3m,3n), by tractions around them (3m,3n), and by tractions
-    on the k triangles (3m,3k)."""
+    """Displacement of m places by that of the n vertices (3m,3n); rows of what tractions around them (3n,3m), and on
+    the k triangles (3k,3m), do to it."""
 
     by_displacement: np.ndarray
     by_vertex: np.ndarray
@@ -193,16 +194,20 @@ class Inside:
 
     def displacement(self, u: np.ndarray, around: np.ndarray, faces: np.ndarray) -> np.ndarray:
         """(m,3) [m] for displacements (n,3) and tractions (n,3), (k,3), of which many are zero."""
-        found = self.by_displacement @ u.ravel()
-        for matrix, tractions in ((self.by_vertex, around.ravel()), (self.by_face, faces.ravel())):
+        real = self.by_displacement.dtype
+        found = self.by_displacement @ u.ravel().astype(real)
+        for rows, tractions in ((self.by_vertex, around.ravel()), (self.by_face, faces.ravel())):
             acts = np.flatnonzero(tractions)
-            if len(acts):
-                found += matrix[:, acts] @ tractions[acts] if 4 * len(acts) < len(tractions) else matrix @ tractions
-        return found.reshape(-1, 3)
+            found += tractions[acts].astype(real) @ (rows if len(acts) == len(rows) else rows[acts])
+        return found.reshape(-1, 3).astype(float)
 
-    def stiffened(self, softer: float) -> Inside:
+    def scaled(self, softer: float) -> Inside:
         """Of a body in which tractions do `softer` times as much."""
-        return Inside(self.by_displacement, softer * self.by_vertex, softer * self.by_face)
+        return Inside(self.by_displacement, self.by_vertex * softer, self.by_face * softer)
+
+    def single(self) -> Inside:
+        """In single precision: half as much to read."""
+        return Inside(*(m.astype(np.float32) for m in (self.by_displacement, self.by_vertex, self.by_face)))
 
 
 def _add_columns(target: np.ndarray, to: np.ndarray, values: np.ndarray) -> None:

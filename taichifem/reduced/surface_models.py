@@ -134,7 +134,7 @@ class BoundarySurface:
         self._invert()
         self._acting = None
         if self._inside is not None:
-            self._inside = self._inside.stiffened(softer)
+            self._inside = self._inside.scaled(softer)
 
     @cached_property
     def _loads(self) -> list[np.ndarray]:
@@ -194,7 +194,7 @@ class BoundarySurface:
         own = found[self.nodes] - self._hanging(e.points)
         if len(self._inner):
             if self._inside is None:  # for whoever asks for inner nodes: made when that happens first
-                self._inside = e.inside(rest[self._inner])
+                self._inside = e.inside(rest[self._inner]).single()
             found[self._inner] = self._inside.displacement(own, around, self.tractions)
             found[self._inner] += self._hanging(rest[self._inner])
         return found
