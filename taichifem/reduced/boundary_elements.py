@@ -104,10 +104,11 @@ class BoundaryElements:
         """Be of another Young's modulus [Pa]: tractions do less by as much, and nothing is integrated again."""
         softer = self.youngs / youngs
         self.youngs, self.mu = youngs, self.mu / softer
-        self.G *= softer
-        self.G_faces *= softer
+        # What was worked out from G, or is so now, before G is another.
         self.face_compliance *= softer
         self.compliance = replace(self.compliance, matrix=softer * self.compliance.matrix)
+        self.G *= softer
+        self.G_faces *= softer
 
     def resultant(self, tractions: np.ndarray) -> np.ndarray:
         """What tractions (k,3) [Pa] on the triangles do to the rigid motions (6,)."""

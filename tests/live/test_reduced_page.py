@@ -46,13 +46,13 @@ def test_the_mouse_pulls_a_bar_of_boundary_elements(tmp_path):
         assert page.value("[...taichifem.panel.rows.keys()].filter((path) => path.startsWith('body')).length") == 1
         rest = points(page)
         before = page.picture().astype(int)
-        tip = rest[np.argmax(rest @ (1.0, -0.5, 0.0))]
+        tip = rest[np.argmax(rest @ (1.0, -0.5, 0.01))]
         start = on_screen(page, tip + np.array([-0.03, 0.0, -0.02]))
         end = start[0], start[1] - 60
         page.press(*start)
         page.wait("taichifem.hand.held")
         page.pull(start, end)
-        top = 3 * int(np.argmax(rest @ (1.0, -0.5, 0.0))) + 2
+        top = 3 * int(np.argmax(rest @ (1.0, -0.5, 0.01))) + 2
         page.wait(f"taichifem.view.update.points[{top}] > {rest.ravel()[top]} + 0.02")
         changed = np.abs(page.picture().astype(int) - before).max(axis=2)
         assert (changed[:, :650] > 40).mean() > 0.01
