@@ -13,7 +13,7 @@ import numpy as np
 from taichifem.reduced.contact import contact_forces
 
 ROUNDS = 16
-TOLERANCE = 1e-6
+TOLERANCE = 1e-5
 """Of the largest force: by how much projections may miss."""
 
 
