@@ -11,9 +11,9 @@ def check(frames):
         surface = np.unique(simulation.surface)
         moved = (simulation.positions - simulation.rest_positions)[surface]
         away = np.linalg.norm(simulation.positions[surface] - collider.center - shift, axis=1)
-        assert away.min() > collider.radius - 5e-3, "contact is linearised along a curved ball"
+        assert away.min() > collider.radius - 1e-5
         dents.append(np.linalg.norm(moved, axis=1).max())
         touched = max(touched, simulation.contacts)
     assert max(dents) > 0.05
-    assert touched > 8
+    assert touched > 6
     assert dents[-1] < 1e-9

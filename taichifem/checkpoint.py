@@ -11,6 +11,7 @@ from pathlib import Path
 
 import numpy as np
 
+from taichifem.clock import Clock, Timed
 from taichifem.errors import InputError
 from taichifem.files import replacing
 
@@ -56,3 +57,34 @@ def read(path: str | os.PathLike) -> tuple[dict[str, np.ndarray], dict]:
     if header["version"] != VERSION:
         raise InputError(f"{path}: checkpoint version {header['version']}, this program reads {VERSION}")
     return arrays, header
+
+
+class Resumable(Timed):
+    """What can be written to a checkpoint and go on from it; how it gives and takes its state is its own."""
+
+    def snapshot(self) -> tuple[dict[str, np.ndarray], dict]:
+        """Arrays and a header with all that the next steps depend on, for `restore`."""
+        raise NotImplementedError
+
+    def restore(self, arrays: dict[str, np.ndarray], header: dict) -> None:
+        """Go on from a `snapshot`."""
+        raise NotImplementedError
+
+    def _fingerprint(self) -> str:
+        raise NotImplementedError
+
+    def save(self, path: str | os.PathLike) -> None:
+        """Write everything the next steps depend on; see `load`. Raises InputError if it cannot be written."""
+        write(path, *self.snapshot())
+
+    def load(self, path: str | os.PathLike) -> None:
+        """Continue from a checkpoint of the same scene, integrator and precision, bit for bit as if never interrupted.
+
+        Raises InputError if the file is missing, damaged, or belongs to another scene; nothing changes then.
+        """
+        arrays, header = read(path)
+        clock = Clock(**header.get("clock", {"fps": 0}))
+        same_steps = self.scene.substeps is None or clock.substeps == self.scene.substeps
+        if header.get("scene") != self._fingerprint() or clock.fps != self.scene.fps or not same_steps:
+            raise InputError(f"{path}: the checkpoint belongs to another scene, time step or precision")
+        self.restore(arrays, header)

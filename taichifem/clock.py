@@ -1,4 +1,4 @@
-"""Frames, steps and time."""
+"""Frames, steps and time, and what goes by them."""
 
 from __future__ import annotations
 
@@ -47,3 +47,55 @@ class Clock:
         self.substep += 1
         if self.substep >= self.substeps:
             self.frame, self.substep = self.frame + 1, 0
+
+
+class Timed:
+    """What advances by steps of a clock."""
+
+    _clock: Clock
+
+    @property
+    def dt(self) -> float:
+        """Time step [s]."""
+        return self._clock.dt
+
+    @property
+    def substeps(self) -> int:
+        """Steps a frame."""
+        return self._clock.substeps
+
+    @property
+    def time(self) -> float:
+        """Simulated time [s]."""
+        return self._clock.time
+
+    @property
+    def frame(self) -> int:
+        """Frames completed."""
+        return self._clock.frame
+
+    @property
+    def substep(self) -> int:
+        """Steps completed of the frame in work."""
+        return self._clock.substep
+
+    @property
+    def step_count(self) -> int:
+        """Steps completed."""
+        return self._clock.steps
+
+    def step(self) -> None:
+        """Advance by one time step."""
+        raise NotImplementedError
+
+    def advance_frame(self) -> None:
+        """Advance to the next frame: `substeps` steps, or what is left of them."""
+        frame = self.frame
+        while self.frame == frame:
+            self.step()
+
+    def advance(self, *, seconds: float) -> None:
+        """Advance by `seconds`, rounded to whole steps."""
+        end = self.time + seconds
+        while self.time + 0.5 * self.dt < end:
+            self.step()

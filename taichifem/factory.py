@@ -14,6 +14,10 @@ def simulate(
 
     precision, arch, threads: as for `Simulation`. Raises InputError for what cannot be simulated.
     """
-    materials = [m for body in scene.bodies for m in (body.material, *body.materials.values())]
-    kind = ReducedSimulation if any(m.reduced for m in materials) else Simulation
+    kind = ReducedSimulation if is_reduced(scene) else Simulation
     return kind(scene, precision=precision, arch=arch, threads=threads)
+
+
+def is_reduced(scene: Scene) -> bool:
+    """Has it bodies of reduced models?"""
+    return any(m.reduced for body in scene.bodies for m in (body.material, *body.materials.values()))

@@ -3,20 +3,17 @@
 from __future__ import annotations
 
 import math
-import os
 from collections.abc import Callable
-from dataclasses import asdict, replace
+from dataclasses import replace
 
 import numpy as np
 
-from taichifem import checkpoint, transfer
-from taichifem.clock import Clock
+from taichifem import transfer
 from taichifem.description import Collider, Load, Material, Scene
 from taichifem.errors import Diverged, InputError
 from taichifem.integrators import ADVANCE, implicit, symplectic_euler
 from taichifem.integrators.step import Options, Step, StepReport
-from taichifem.interactive import InteractiveBodies
-from taichifem.state import element_fields, node_fields
+from taichifem.resumable_bodies import ResumableBodies
 from taichifem.stats import Stats, figures
 from taichifem.supports import check_supports
 from taichifem.timing import PhaseTimer
@@ -25,7 +22,7 @@ STATIC_TOLERANCE, STATIC_ITERATIONS = 1e-6, 50_000
 """Of the linear solver in a static solve: the stiffness matrix alone is far worse conditioned than a step's."""
 
 
-class Simulation(InteractiveBodies):
+class Simulation(ResumableBodies):
     """The state of a scene over time. Arrays in and out are NumPy, float64, SI units; z points up.
 
     precision: "f32" (real time) or "f64".  arch, threads: as `taichifem.runtime.start`; None keeps what runs.
@@ -44,13 +41,11 @@ class Simulation(InteractiveBodies):
         self._timer = PhaseTimer()
         self._report = StepReport()
         self._stats: Stats | None = None
-        self._fresh = True
         self._loaded: list[float] | None = None
         self._share_on = 0.0
         self._before: tuple[float, np.ndarray, dict[str, np.ndarray]] | None = None
         self._explicit = scene.integrator == "symplectic-euler"
         self._restiffened = False
-        self._clock = Clock(fps=scene.fps, substeps=scene.substeps or 1)
         if scene.integrator == "quasi-static":
             check_supports(scene, self._layout)
         self._surround(0.0, self.dt)
@@ -58,36 +53,6 @@ class Simulation(InteractiveBodies):
             self._keep_stable()
 
     # Time
-
-    @property
-    def dt(self) -> float:
-        """Time step [s]."""
-        return self._clock.dt
-
-    @property
-    def substeps(self) -> int:
-        """Steps a frame."""
-        return self._clock.substeps
-
-    @property
-    def time(self) -> float:
-        """Simulated time [s]."""
-        return self._clock.time
-
-    @property
-    def frame(self) -> int:
-        """Frames completed."""
-        return self._clock.frame
-
-    @property
-    def substep(self) -> int:
-        """Steps completed of the frame in work."""
-        return self._clock.substep
-
-    @property
-    def step_count(self) -> int:
-        """Steps completed."""
-        return self._clock.steps
 
     def step(self) -> None:
         """Advance by one time step. Raises Diverged, with the state before the step kept, on NaN or infinity."""
@@ -146,18 +111,6 @@ class Simulation(InteractiveBodies):
                 self._due = step.due
                 raise Diverged(f"the simulation diverged at t = {self.time:.4g} s: {error}") from None
         self._due = self.dt
-
-    def advance_frame(self) -> None:
-        """Advance to the next frame: `substeps` steps, or what is left of them."""
-        frame = self.frame
-        while self.frame == frame:
-            self.step()
-
-    def advance(self, *, seconds: float) -> None:
-        """Advance by `seconds`, rounded to whole steps."""
-        end = self.time + seconds
-        while self.time + 0.5 * self.dt < end:
-            self.step()
 
     def balance(self, *, share: float = 1.0, tolerance: float = 1e-9, max_newton: int = 30) -> StepReport:
         """Find the balance under the part `share` of gravity, loads and motions; for "quasi-static" scenes.
@@ -279,6 +232,11 @@ class Simulation(InteractiveBodies):
     def _changed(self) -> None:
         self._stats, self._fresh = None, True
 
+    def _resumed(self, same: bool) -> None:
+        self._stats = self._loaded = None
+        if self._explicit and not same:
+            self._keep_stable()
+
     @property
     def report(self) -> StepReport:
         """What the last step took: iterations, residual, contact passes. Costs nothing, unlike `stats`."""
@@ -309,70 +267,3 @@ class Simulation(InteractiveBodies):
         from taichifem.output.notebook import picture  # a look upstairs, for a short name people can call
 
         return picture(self, seconds=seconds, size=size)
-
-    # Checkpoints
-
-    def _fingerprint(self) -> str:
-        layout = self._whole
-        return checkpoint.fingerprint(
-            layout.rest,
-            layout.cells,
-            layout.cell_materials,
-            text=f"{self.precision} {len(self.scene.colliders)} {self.scene.integrator}",
-        )
-
-    def save(self, path: str | os.PathLike) -> None:
-        """Write everything the next steps depend on; see `load`. Raises InputError if it cannot be written."""
-        checkpoint.write(path, *self.snapshot())
-
-    def snapshot(self) -> tuple[dict[str, np.ndarray], dict]:
-        """What `save` writes: arrays and a header, for `restore`."""
-        w = self._world
-        with self._kernels():
-            arrays = {name: transfer.read(w, getattr(w, name), count) for name, count in self._state().items()}
-        arrays |= self._read_contacts(self._counts.colliders)
-        arrays |= {"cells": self.cells, "origins": self.origins, "tips": self.crack_tips}
-        header = {"scene": self._fingerprint(), "clock": asdict(self._clock), "fresh": self._fresh, "due": self._due}
-        return arrays, header
-
-    def load(self, path: str | os.PathLike) -> None:
-        """Continue from a checkpoint of the same scene, integrator and precision, bit for bit as if never interrupted.
-
-        Raises InputError if the file is missing, damaged, or belongs to another scene; nothing changes then.
-        """
-        arrays, header = checkpoint.read(path)
-        clock = Clock(**header.get("clock", {"fps": 0}))
-        same_steps = self.scene.substeps is None or clock.substeps == self.scene.substeps
-        if header.get("scene") != self._fingerprint() or clock.fps != self.scene.fps or not same_steps:
-            raise InputError(f"{path}: the checkpoint belongs to another scene, time step or precision")
-        self.restore(arrays, header)
-
-    def restore(self, arrays: dict[str, np.ndarray], header: dict) -> None:
-        """Go on from a `snapshot` of the same meshes and time step; hands let go.
-
-        One of other laws or another integrator will do too: what only one of the two knows of begins at rest.
-        """
-        w, same = self._world, header["scene"] == self._fingerprint()
-        self._hands.clear()
-        topology = ("cells", self.cells), ("tips", self.crack_tips)
-        if all(np.array_equal(arrays[name], now) for name, now in topology):
-            self._surroundings.forget()
-        else:
-            self._become(arrays["cells"], arrays["origins"], arrays["tips"])
-        with self._kernels():
-            for name in self._state():
-                if name in arrays:
-                    transfer.write(w, getattr(w, name), arrays[name])
-        self._write_contacts(arrays)
-        self._clock, self._fresh, self._due = Clock(**header["clock"]), not same or bool(header["fresh"]), header["due"]
-        if not same and self._clock.substep == 0:
-            self._clock.substeps = self.scene.substeps or 1
-        self._surround(self.time, self.dt)
-        self._stats = self._loaded = None
-        if self._explicit and not same:
-            self._keep_stable()
-
-    def _state(self) -> dict[str, int]:
-        """Fields that go into a checkpoint, and how many entries of each."""
-        of_nodes = dict.fromkeys(node_fields(self.scene), self._counts.nodes)
-        return of_nodes | dict.fromkeys(element_fields(self._laws), self._counts.elements)

@@ -12,8 +12,6 @@ import click
 
 from taichifem.app.demos import find_demo
 from taichifem.app.starting import start_taichi
-from taichifem.description import Scene
-from taichifem.errors import InputError
 from taichifem.scene import read_scene
 
 
@@ -40,7 +38,6 @@ def run_live(source: str, options: LiveOptions) -> None:
 
     path = Path(source) if Path(source).suffix == ".toml" or Path(source).is_file() else find_demo(source).path
     scene = read_scene(path, overrides=options.overrides)
-    _check(scene)
     if options.window:
         from taichifem.live.window import need_window
 
@@ -73,14 +70,3 @@ def run_live(source: str, options: LiveOptions) -> None:
         for number, handler in before.items():
             signal.signal(number, handler)
         server.close()
-
-
-def _check(scene: Scene) -> None:
-    """Raise InputError for bodies that hands cannot be laid on."""
-    for b, body in enumerate(scene.bodies):
-        reduced = [m.model for m in (body.material, *body.materials.values()) if m.reduced]
-        if reduced:
-            raise InputError(
-                f"body.{body.name or b}: model {reduced[0]!r} cannot be taken hold of live: use "
-                f"--set body.{b}.material.model=linear, or `taichifem run SCENE -o FILE` to watch it"
-            )

@@ -10,11 +10,10 @@ from dataclasses import dataclass, replace
 from typing import Any
 
 from taichifem.description import Fracture, Material, Scene
-from taichifem.description.material import CREEP_KEYS, MODELS, PLASTICITIES, ROTATIONS, WRAPPED, YIELD_KEYS
+from taichifem.description.material import CREEP_KEYS, MODELS, PLASTICITIES, REDUCED, ROTATIONS, WRAPPED, YIELD_KEYS
 from taichifem.description.scene import INTEGRATORS, SOLVERS
 from taichifem.description.view import COLORS
 from taichifem.errors import InputError
-from taichifem.live.tools import Tools
 
 Value = float | int | bool | str | None
 
@@ -59,8 +58,10 @@ def _plasticity(*names: str) -> Callable[[Material], bool]:
 
 _creeps, _yields = _plasticity("creep"), _plasticity("von-mises", "tresca")
 
+FULL = tuple(name for name in MODELS if name not in REDUCED)
+
 MATERIAL = (
-    Parameter(name="model", label="elastic model", choices=MODELS),
+    Parameter(name="model", label="elastic model", choices=FULL),
     Parameter(name="wraps", label="continues", choices=WRAPPED, applies=_model("invertible")),
     Parameter(name="threshold", label="from stretch", low=0.05, high=0.95, applies=_model("invertible")),
     Parameter(name="rotation", label="rotation", choices=ROTATIONS, applies=_model("corotational")),
@@ -146,23 +147,8 @@ TOOLS = (
 )
 """Of what a person works with: no part of the scene."""
 
-_SECTIONS = {"simulation": SIMULATION, "view": VIEW, "tools": TOOLS}
+SECTIONS = {"simulation": SIMULATION, "view": VIEW, "tools": TOOLS}
 _AXES = "xyz"
-
-
-def panel(scene: Scene, tools: Tools) -> list[dict[str, Any]]:
-    """What to show: groups with a title and rows, each a parameter with its path and value; plain data for JSON."""
-    groups = [
-        {
-            "title": title,
-            "rows": [_row(p, f"{prefix}.{p.name}", get(material, p.name)) for p in MATERIAL if p.applies(material)],
-        }
-        for title, prefix, material in materials(scene)
-    ]
-    for title, section in (("simulation", scene), ("view", scene.view), ("tools", tools)):
-        rows = [_row(p, f"{title}.{p.name}", get(section, p.name)) for p in _SECTIONS[title]]
-        groups.append({"title": title, "rows": rows})
-    return groups
 
 
 def materials(scene: Scene) -> Iterator[tuple[str, str, Material]]:
@@ -172,16 +158,6 @@ def materials(scene: Scene) -> Iterator[tuple[str, str, Material]]:
         yield title, f"body.{b}.material", body.material
         for region, material in sorted(body.materials.items()):
             yield f"{title}, region {region}", f"body.{b}.materials.{region}", material
-
-
-def _row(parameter: Parameter, path: str, value: Value) -> dict[str, Any]:
-    p = parameter
-    row = {"path": path, "label": p.label, "unit": p.unit, "kind": p.kind, "value": value}
-    if p.kind == "choice":
-        return row | {"choices": p.choices}
-    if p.kind == "switch":
-        return row
-    return row | {"low": p.low, "high": p.high, "log": p.log, "whole": p.whole, "optional": p.optional, "none": p.none}
 
 
 def get(thing: Material | Scene | Any, name: str) -> Value:
@@ -229,7 +205,7 @@ def find(path: str) -> tuple[str, Parameter]:
     Raises InputError for a path that no parameter has.
     """
     place, parameters = path, ()
-    for section, known in _SECTIONS.items():
+    for section, known in SECTIONS.items():
         if path.startswith(section + "."):
             place, parameters = section, known
     if path.startswith("body."):
@@ -261,7 +237,7 @@ def differences(before: Scene, after: Scene, *, all_said: bool = False) -> list[
     for (_, prefix, one), (_, _, two) in zip(materials(before), materials(after), strict=True):
         found += _different(one, two, prefix, MATERIAL, all_said)
     for section, of in (("simulation", lambda s: s), ("view", lambda s: s.view)):
-        found += _different(of(before), of(after), section, _SECTIONS[section], all_said)
+        found += _different(of(before), of(after), section, SECTIONS[section], all_said)
     return found
 
 

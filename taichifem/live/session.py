@@ -11,13 +11,14 @@ import numpy as np
 
 from taichifem.description import Camera, check
 from taichifem.errors import Diverged, InputError
-from taichifem.live import messages, parameters
+from taichifem.live import messages
 from taichifem.live.broadcast import Broadcast
 from taichifem.live.filming import Film
 from taichifem.live.inbox import Inbox
 from taichifem.live.interactions import checked
 from taichifem.live.keeping import Keeper
 from taichifem.live.measuring import Meter
+from taichifem.live.panel import panel
 from taichifem.live.stage import Kept, Stage
 from taichifem.output.camera import frame_points
 from taichifem.output.colors import VIRIDIS
@@ -195,7 +196,7 @@ class Session:
         stage = self.stage
         if self._panel:
             self._panel = False
-            self.out.tell("panel", groups=parameters.panel(stage.scene, stage.tools))
+            self.out.tell("panel", groups=panel(stage.scene, stage.tools))
         self.out.tell("hands", names=list(stage.hands))
         self.out.tell(
             "state",

@@ -11,12 +11,13 @@ import numpy as np
 
 from taichifem.description import Material, PlaneCollider, Scene
 from taichifem.errors import Diverged, InputError
+from taichifem.factory import is_reduced, simulate
 from taichifem.hands import Hand
 from taichifem.live import parameters
 from taichifem.live.ball import LIFE, Ball
 from taichifem.live.interactions import Action, Interactions
+from taichifem.live.panel import check_offered
 from taichifem.live.tools import Tools, tools_for
-from taichifem.simulation import Simulation
 
 FAR = 1e4
 """Sizes of the scene that a node may be away from its rest before the simulation counts as diverged."""
@@ -49,7 +50,7 @@ class Stage:
         threads: int | None = None,
         on_rebuild: Callable[[], None] = lambda: None,
     ) -> None:
-        if scene.integrator == "quasi-static":
+        if scene.integrator == "quasi-static" and not is_reduced(scene):
             raise InputError('integrator "quasi-static" knows no time to act in: choose another, as with --set')
         self.original = self.scene = scene
         self.tools: Tools = tools_for(scene)
@@ -61,7 +62,7 @@ class Stage:
         self._make(scene)
 
     def _make(self, scene: Scene) -> None:
-        self.simulation = Simulation(scene, **self._machine)
+        self.simulation = simulate(scene, **self._machine)
         self._start = self.simulation.snapshot()
         x = self.simulation.rest_positions
         self._reach = FAR * max(float(np.abs(x).max()), float(np.ptp(x, axis=0).max()))
@@ -106,6 +107,7 @@ class Stage:
 
     def _set(self, path: str, value: parameters.Value) -> None:
         place, parameter = parameters.find(path)
+        check_offered(self.scene, place, parameter)
         value = parameters.check_value(parameter, value)
         if place == "tools":
             self.tools = parameters.changed(self.tools, parameter.name, value)
@@ -197,6 +199,8 @@ class Stage:
 
     def _throw(self, origin: tuple, velocity: tuple, radius: float) -> None:
         simulation = self.simulation
+        if is_reduced(self.scene):
+            raise InputError("reduced models meet no ball: poke them, pull them, or have a collider in the scene file")
         mass = 4.2 * radius**3 * max(m.density for _, _, m in parameters.materials(self.scene))
         self._ball = Ball(np.array(origin), np.array(velocity), radius, mass, simulation.time + LIFE)
         simulation.set_colliders([*self.scene.colliders, self._ball.collider(simulation.time, simulation.dt)])
@@ -208,6 +212,9 @@ class Stage:
 
     def save_state(self, path: str | PathLike) -> None:
         """Write a checkpoint of the scene as it is now; a ball in the air is no part of it."""
+        if self._ball is None:
+            self.simulation.save(path)
+            return
         with_ball = self.simulation.scene.colliders
         self.simulation.set_colliders(self.scene.colliders)
         try:

@@ -34,10 +34,12 @@ def tools_for(scene: Scene) -> Tools:
     size = float(np.median([np.cbrt(np.prod(np.maximum(s, 0.1 * s.max()))) for s in sizes]))
     youngs = float(np.median([body.material.youngs for body in scene.bodies]))
     mass = float(np.median([body.material.density * size**3 for body in scene.bodies]))
+    # Where nothing has inertia, a poke is a force that dents.
+    impulse = 1.5e-3 * youngs * size**2 if scene.integrator == "quasi-static" else 0.5 * mass
     return Tools(
         strength=_rounded(0.1 * youngs * size),
         radius=_rounded(0.2 * size),
-        impulse=_rounded(0.5 * mass),
+        impulse=_rounded(impulse),
         ball_radius=_rounded(0.3 * size),
     )
 

@@ -15,7 +15,7 @@ import numpy as np
 from taichifem.errors import InputError
 from taichifem.live.controls import ASKS, KEYS, TOOLS, asking
 from taichifem.live.keeping import Keeper
-from taichifem.live.parameters import panel
+from taichifem.live.panel import panel, tools_offered
 from taichifem.live.picking import ray_through
 from taichifem.live.pointer import Pointer
 from taichifem.live.session import Session
@@ -110,7 +110,7 @@ class Window:
         """Draw the controls. Is the mouse, at x and y of the window, over them?"""
         with gui.sub_window("taichifem", 0.0, 0.0, 0.2, 0.75):
             self._figures(gui)
-            for tool in TOOLS:
+            for tool in tools_offered(self._session.stage.scene):
                 if gui.button(f"[{tool}]" if tool == self._pointer.tool else tool):
                     self._pointer.tool = tool
             if gui.button("gravity"):

@@ -7,7 +7,7 @@ where they are reactions, so that edges at which given tractions jump are no tro
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
@@ -100,6 +100,16 @@ class BoundaryElements:
         balance = np.einsum("nm,nar->rma", mass, motions).reshape(6, -1)
         return Compliance(self._inverse @ self.G, self.rigid, balance)
 
+    def stiffen(self, youngs: float) -> None:
+        """Be of another Young's modulus [Pa]: tractions do less by as much, and nothing is integrated again."""
+        softer = self.youngs / youngs
+        self.youngs, self.mu = youngs, self.mu / softer
+        # What was worked out from G, or is so now, before G is another.
+        self.face_compliance *= softer
+        self.compliance = replace(self.compliance, matrix=softer * self.compliance.matrix)
+        self.G *= softer
+        self.G_faces *= softer
+
     def resultant(self, tractions: np.ndarray) -> np.ndarray:
         """What tractions (k,3) [Pa] on the triangles do to the rigid motions (6,)."""
         middle = self.rigid.reshape(-1, 3, 6)[self.triangles].mean(axis=1)
@@ -170,22 +180,35 @@ class BoundaryElements:
         # Inside a body that is shifted, all is.
         excess = by_displacement.sum(axis=2) - np.eye(3)
         by_displacement -= excess[:, :, None, :] / n
-        return Inside(*(block.reshape(3 * m, -1) for block in (by_displacement, by_vertex, by_face)))
+        follows = by_displacement.reshape(3 * m, -1)
+        return Inside(follows, *(np.ascontiguousarray(block.reshape(3 * m, -1).T) for block in (by_vertex, by_face)))
 
 
 @dataclass(frozen=True)
 class Inside:
-    """Displacement of m places by that of the n vertices (3m,3n), by tractions around them (3m,3n), and by tractions
-    on the k triangles (3m,3k)."""
+    """Displacement of m places by that of the n vertices (3m,3n); rows of what tractions around them (3n,3m), and on
+    the k triangles (3k,3m), do to it."""
 
     by_displacement: np.ndarray
     by_vertex: np.ndarray
     by_face: np.ndarray
 
     def displacement(self, u: np.ndarray, around: np.ndarray, faces: np.ndarray) -> np.ndarray:
-        """(m,3) [m] for displacements (n,3) and tractions (n,3), (k,3)."""
-        found = self.by_displacement @ u.ravel() + self.by_vertex @ around.ravel()
-        return (found + self.by_face @ faces.ravel()).reshape(-1, 3)
+        """(m,3) [m] for displacements (n,3) and tractions (n,3), (k,3), of which many are zero."""
+        real = self.by_displacement.dtype
+        found = self.by_displacement @ u.ravel().astype(real)
+        for rows, tractions in ((self.by_vertex, around.ravel()), (self.by_face, faces.ravel())):
+            acts = np.flatnonzero(tractions)
+            found += tractions[acts].astype(real) @ (rows if len(acts) == len(rows) else rows[acts])
+        return found.reshape(-1, 3).astype(float)
+
+    def scaled(self, softer: float) -> Inside:
+        """Of a body in which tractions do `softer` times as much."""
+        return Inside(self.by_displacement, self.by_vertex * softer, self.by_face * softer)
+
+    def single(self) -> Inside:
+        """In single precision: half as much to read."""
+        return Inside(*(m.astype(np.float32) for m in (self.by_displacement, self.by_vertex, self.by_face)))
 
 
 def _add_columns(target: np.ndarray, to: np.ndarray, values: np.ndarray) -> None:

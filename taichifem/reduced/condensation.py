@@ -46,8 +46,14 @@ class Condensation:
                 self.follow[:, part] = -self._solve_inner(across[:, part].toarray())
             schur += K[s][:, i] @ self.follow
         self.stiffness = 0.5 * (schur + schur.T)
+        self._stiffer = 1.0
         self._masses_skin, self._masses_inner = np.repeat(masses[skin], 3), np.repeat(masses[inner], 3)
         self.rigid, _ = np.linalg.qr(rigid_motions(rest[skin], 3).reshape(len(s), 6))
+
+    def stiffen(self, factor: float) -> None:
+        """Be `factor` times as stiff everywhere: inner nodes follow the surface as before."""
+        self.stiffness = factor * self.stiffness
+        self._stiffer *= factor
 
     def load(self, forces: np.ndarray) -> np.ndarray:
         """Forces on all nodes (n,3) as they act on the surface (3s,)."""
@@ -62,7 +68,7 @@ class Condensation:
         """Displacement (i,3) of the inner nodes for that of the surface (3s,) and forces on all nodes (n,3)."""
         moved = self.follow @ surface
         if forces is not None and self._solve_inner is not None:
-            moved = moved + self._solve_inner(forces[self.inner].ravel())
+            moved = moved + self._solve_inner(forces[self.inner].ravel()) / self._stiffer
         return moved.reshape(-1, 3)
 
     def compliance(self) -> Compliance:

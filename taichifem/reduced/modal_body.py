@@ -11,9 +11,11 @@ from typing import NamedTuple
 
 import numpy as np
 
+from taichifem.description import Material
 from taichifem.errors import InputError
 from taichifem.layout import Group
 from taichifem.reduced.frames import DrivenFrame, FreeFrame
+from taichifem.reduced.grip import NOTHING, Grip
 from taichifem.reduced.modal_skin import ClusteredSkin, Skin
 from taichifem.reduced.modes import Modes, lowest_modes
 from taichifem.reduced.oscillators import Oscillators
@@ -23,6 +25,8 @@ from taichifem.reduced.touching import Touch
 from taichifem.surroundings import pose
 
 RIGID = 6
+FIRM = 1e-4
+"""Of the flexibility of the points in a step: what a firm hand gives way by."""
 
 
 def modes_of(parts: Parts, count: int, *, basis: str = "fem") -> Modes:
@@ -77,6 +81,7 @@ class ModalBody:
             places = places - (self.frame.origin if isinstance(self.frame, FreeFrame) else 0.0)
             rows = lies.points(self.shapes.reshape(len(self.shapes), -1), parts.cells).reshape(len(places), 3, -1)
         self.skin = ClusteredSkin(places, rows, np.float32 if precision == "f32" else np.float64)
+        self._youngs, self._frequencies = material.youngs, found.frequencies
         self._moment = np.einsum("n,nak->ak", parts.masses, self.shapes)
         self._tensor = np.einsum("n,nb,nak->abk", parts.masses, self.local, self.shapes)
         self._loads = [_ModalLoad(load, self.shapes, self.local) for load in parts.loads]
@@ -155,12 +160,29 @@ class ModalBody:
         else:
             self.frame = replace(self.frame, time=time)
 
+    @property
+    def holdable(self) -> np.ndarray:
+        """Nodes that hands can take hold of (n,): all."""
+        return np.arange(len(self.local))
+
+    def set_material(self, material: Material) -> None:
+        """Another Young's modulus or damping from the next step on: the shapes stay, frequencies change."""
+        before, self._drag = self.modes, material.mass_damping
+        self._frequencies = np.sqrt(material.youngs / self._youngs) * self._frequencies
+        self._youngs = material.youngs
+        self.modes = Oscillators(
+            self._frequencies, mass_damping=material.mass_damping, stiffness_damping=material.stiffness_damping
+        )
+        self.modes.q, self.modes.v = before.q, before.v
+
     # Steps
 
-    def advance(self, dt: float, time: float, gravity: np.ndarray, obstacles) -> None:
-        """From `time` to `time` + dt [s] under gravity (3,) [m/s^2]."""
+    def advance(self, dt: float, time: float, gravity: np.ndarray, obstacles, grip: Grip = NOTHING) -> None:
+        """From `time` to `time` + dt [s] under gravity (3,) [m/s^2], with hands on it."""
         push = self._outer_forces(dt, time, gravity)
-        push = push + self._pull(dt, time, push)
+        if len(grip.pushed):
+            push = push + np.einsum("nar,na->r", self._nodes.part(grip.pushed).levers(self.keep()), grip.forces)
+        push = push + self._pull(dt, time, push, grip)
         push = self.touch.press(self, push, dt, time, obstacles)
         self.frame, self.modes.q, self.modes.v = self.trial(dt, push)
         self.touch.stop(self, dt)
@@ -214,21 +236,23 @@ class ModalBody:
         k = self.frame.coordinates
         self.frame, self.modes.v = self.frame.struck(impulse[:k]), self.modes.v + impulse[k:]
 
-    def _pull(self, dt: float, time: float, push: np.ndarray) -> np.ndarray:
-        """Generalised forces of the handles, by where the points will be under them: F = k (target - x)."""
+    def _pull(self, dt: float, time: float, push: np.ndarray, grip: Grip) -> np.ndarray:
+        """Generalised forces of handles and hands, by where the points will be under them: F = k (target - x)."""
         acting = [group for group in self._handles if group.acts_at(time + dt)]
-        if not acting:
+        if not acting and not len(grip.held):
             return np.zeros_like(push)
-        nodes = np.concatenate([group.nodes for group in acting])
-        stiffness = np.concatenate([np.full(len(group.nodes), group.stiffness) for group in acting])
-        target = np.concatenate([self._target(group, time + dt) for group in acting])
+        nodes = np.concatenate([grip.held, *(group.nodes for group in acting)])
+        springs = [np.full(len(group.nodes), 1 / group.stiffness) for group in acting]
+        softness = np.repeat(np.concatenate([grip.softness, *springs]), 3)
+        target = np.concatenate([grip.targets, *(self._target(group, time + dt) for group in acting)])
         held = self._nodes.part(nodes)
         free = held.at(self.trial(dt, push))
         J = held.levers(self.keep()).reshape(3 * len(nodes), -1)
-        pulled = np.repeat(stiffness, 3)[:, None] * J
-        return np.linalg.solve(
-            np.eye(len(push)) + pulled.T @ J @ self.compliance(dt), pulled.T @ (target - free).ravel()
-        )
+        compliance = self.compliance(dt)
+        # Firm hands may ask for more than the modes can do: they are springs that are stiff against all else.
+        own = np.einsum("ar,rs,as->a", J, compliance, J)
+        pulled = J / np.maximum(softness, FIRM * own.max())[:, None]
+        return np.linalg.solve(np.eye(len(push)) + pulled.T @ J @ compliance, pulled.T @ (target - free).ravel())
 
     def _target(self, group: Group, time: float) -> np.ndarray:
         turn, shift = pose(group.motion, time)

@@ -13,16 +13,16 @@ _array = ti.types.ndarray
 
 
 @ti.kernel
-def _gaps(table: _array(), before: _array(), after: _array(), gaps: _array(), normals: _array()):
-    # A few thousand points at most: to wake threads up takes longer.
+def _gaps(table: _array(), ends: _array(), found: _array()):
+    # A few thousand points at most: to wake threads up takes longer; so does handing over more arrays.
     ti.loop_config(serialize=True)
-    for i, c in ti.ndrange(before.shape[0], table.shape[0]):
+    for i, c in ti.ndrange(ends.shape[1], table.shape[0]):
         start, end = ti.Vector.zero(ti.f64, 3), ti.Vector.zero(ti.f64, 3)
         size, normal = ti.Vector.zero(ti.f64, 3), ti.Vector.zero(ti.f64, 3)
         R0, R1 = ti.Matrix.zero(ti.f64, 3, 3), ti.Matrix.zero(ti.f64, 3, 3)
         for a in ti.static(range(3)):
-            start[a] = before[i, a] - table[c, 14 + a]
-            end[a] = after[i, a] - table[c, 5 + a]
+            start[a] = ends[0, i, a] - table[c, 14 + a]
+            end[a] = ends[1, i, a] - table[c, 5 + a]
             size[a] = table[c, 2 + a]
             for b in ti.static(range(3)):
                 R1[a, b] = table[c, 17 + 3 * a + b]
@@ -36,9 +36,9 @@ def _gaps(table: _array(), before: _array(), after: _array(), gaps: _array(), no
         elif kind == collision.BOX:
             gap, normal = collision.gap_to_box(p0, p1, 0.5 * size)
         outward = R1 @ normal
-        gaps[i, c] = gap
+        found[i, c, 0] = gap
         for a in ti.static(range(3)):
-            normals[i, c, a] = outward[a]
+            found[i, c, 1 + a] = outward[a]
 
 
 class Obstacles:
@@ -74,12 +74,22 @@ class Obstacles:
     def gaps(self, table: np.ndarray, before: np.ndarray, after: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """Gaps (n,colliders) [m] of points that go from `before` to `after` (n,3), negative inside, and the outward
         normals (n,colliders,3)."""
-        gaps, normals = np.zeros((len(after), self.count)), np.zeros((len(after), self.count, 3))
+        found = np.zeros((len(after), self.count, 4))
         if self.count and len(after):
-            ends = (np.ascontiguousarray(points, dtype=np.float64) for points in (before, after))
             with runtime.precision_of("f64"):
-                _gaps(np.ascontiguousarray(table), *ends, gaps, normals)
-        return gaps, normals
+                _gaps(np.ascontiguousarray(table), np.stack([before, after]).astype(np.float64, copy=False), found)
+        return found[..., 0], found[..., 1:]
+
+    def standing(
+        self, table: np.ndarray, which: np.ndarray, points: np.ndarray, gaps: np.ndarray, normals: np.ndarray
+    ) -> tuple[np.ndarray, np.ndarray]:
+        """Gaps (m,) and normals (m,3) of points (m,3) that touch the colliders `which` (m,): from balls, those where
+        they are and not where they came in, which is the same for flat faces, unless the middle lies between."""
+        arm = points - table[which, 5:8]
+        away = np.linalg.norm(arm, axis=1)
+        own = arm / np.maximum(away, 1e-300)[:, None]
+        ball = (table[which, 0] == collision.SPHERE) & ((own * normals).sum(axis=1) > 0.5)
+        return np.where(ball, away - table[which, 2], gaps), np.where(ball[:, None], own, normals)
 
     def carried(self, table: np.ndarray, which: np.ndarray, points: np.ndarray, dt: float) -> np.ndarray:
         """How far (n,3) [m] the colliders `which` (n,) take points (n,3) along that stick to them, over dt [s]."""

@@ -4,14 +4,18 @@ from __future__ import annotations
 
 import numpy as np
 
+from taichifem.description import Material
 from taichifem.errors import InputError
 from taichifem.layout import Group
-from taichifem.reduced.contact import contact_forces, frames_of
+from taichifem.reduced.answer import Answer
+from taichifem.reduced.grip import NOTHING, Grip
 from taichifem.reduced.parts import Parts
+from taichifem.reduced.surface_contact import SurfaceContact
 from taichifem.reduced.surface_models import BoundarySurface, CondensedSurface
 from taichifem.surroundings import pose
 
-PASSES = 8
+FIRM = 1e-9
+"""Of the largest flexibility: axes that give way less are held by pins."""
 
 
 class SurfaceBody:
@@ -25,7 +29,8 @@ class SurfaceBody:
         self.v = parts.velocities[nodes].ravel() if isinstance(model, CondensedSurface) else 0 * self.u
         self._forces: np.ndarray | None = np.zeros_like(self.u)
         self._asked: np.ndarray | None = None
-        self.contacts = 0
+        self._everywhere: tuple[np.ndarray, np.ndarray] | None = None
+        self._contact = SurfaceContact(self._rest)
         self._groups = [self._seen(group) for group in (*parts.pins, *parts.handles)]
         self._active: list[bool] | None = None
 
@@ -46,8 +51,10 @@ class SurfaceBody:
 
     @property
     def displacement(self) -> np.ndarray:
-        """Of all nodes (n,3) [m]; that of inner nodes is worked out here."""
-        return self.model.everywhere(self.u, self.forces)
+        """Of all nodes (n,3) [m]; that of inner nodes is worked out here, once for a state."""
+        if self._everywhere is None or self._everywhere[0] is not self.u:
+            self._everywhere = self.u, self.model.everywhere(self.u, self.forces)
+        return self._everywhere[1].copy()
 
     @property
     def positions(self) -> np.ndarray:
@@ -85,16 +92,33 @@ class SurfaceBody:
 
     def state(self) -> dict[str, np.ndarray]:
         """What the next steps depend on."""
-        return {"u": self.u, "v": self.v, "forces": self.forces}
+        return {"u": self.u, "v": self.v, "forces": self.forces} | self._contact.state()
 
     def set_state(self, state: dict[str, np.ndarray], time: float) -> None:
         """The inverse of `state`."""
         self.u, self.v, self._forces = (state[name].copy() for name in ("u", "v", "forces"))
+        self._contact.set_state(state)
+
+    @property
+    def contacts(self) -> int:
+        """Points that were pushed in the last step."""
+        return len(self._contact.points)
+
+    @property
+    def holdable(self) -> np.ndarray:
+        """Nodes that hands can take hold of (s,)."""
+        return self.model.nodes
+
+    def set_material(self, material: Material) -> None:
+        """Another Young's modulus or damping from the next step on; forces of the last step are those it took."""
+        self._forces = self.forces
+        self.model.set_material(material)
+        self._active = None
 
     # Steps
 
-    def advance(self, dt: float, time: float, gravity: np.ndarray, obstacles) -> None:
-        """From `time` to `time` + dt [s] under gravity (3,) [m/s^2]."""
+    def advance(self, dt: float, time: float, gravity: np.ndarray, obstacles, grip: Grip = NOTHING) -> None:
+        """From `time` to `time` + dt [s] under gravity (3,) [m/s^2], with hands on it."""
         end = time + dt
         self._hold([group.acts_at(end) for group, _ in self._groups])
         loads = {k: field.load.share_at(end) for k, field in enumerate(self.parts.loads)}
@@ -105,17 +129,44 @@ class SurfaceBody:
         if self._asked is None or not np.array_equal(asked, self._asked):
             self._asked = asked
             self._alone = free + self._moved_by @ stretch + self._shifted_by @ out_of_balance
-        pushed, axes = self._contact(self._alone, dt, time, obstacles)
-        new = self._alone + pushed @ self._columns[axes]
-        self._last = stretch, out_of_balance, axes, pushed
+        new, acting = self._gripped(self._alone, grip)
+        if obstacles.count:
+            contact = self._contact
+            contact.press(self._answer, self._rest + self.u.reshape(-1, 3), new, dt, time, obstacles)
+            if len(contact.points):
+                moved, against = self._answer.moved(contact.axes, contact.pushed.ravel())
+                new = new + moved
+                acting += [(contact.axes, contact.pushed.ravel()), (self._answer.axes, against)]
+        self._last = stretch, out_of_balance, acting
         self._forces = None
         self.v, self.u = (new - self.u) / dt, new
+
+    def _gripped(self, alone: np.ndarray, grip: Grip) -> tuple[np.ndarray, list[tuple[np.ndarray, np.ndarray]]]:
+        """Where all axes are with hands but without contact, and what acts on which axes."""
+        acting = []
+        if len(grip.pushed):
+            acting.append((self._on(grip.pushed), grip.forces.ravel()))
+            alone = alone + acting[0][1] @ self._columns[acting[0][0]]
+        axes, softness, targets = self._on(grip.held), np.repeat(grip.softness, 3), grip.targets.ravel()
+        gives = self._gives[axes]  # what pins hold is not the hands'
+        axes, softness, targets = axes[gives], softness[gives], targets[gives]
+        if not self._answer.holds(axes, softness):
+            self._answer.hold(axes, softness)
+        if len(axes):
+            pulled, alone = self._answer.pull(alone, targets - self._rest.ravel()[axes])
+            acting.append((axes, pulled))
+        return alone, acting
+
+    def _on(self, nodes: np.ndarray) -> np.ndarray:
+        """Axes (3h,) of nodes (h,) of the body that are on its surface."""
+        return (3 * np.searchsorted(self.model.nodes, nodes)[:, None] + np.arange(3)).ravel()
 
     @property
     def forces(self) -> np.ndarray:
         """Of pins, handles and contact on the surface (3s,) [N] in the last step."""
         if self._forces is None:
-            stretch, out_of_balance, axes, pushed = self._last
+            stretch, out_of_balance, acting = self._last
+            pushed, axes = _summed(acting)
             self._forces = np.zeros_like(self.u)
             self._forces[axes] = pushed
             self._forces[self._axes] += self._reactions(stretch, out_of_balance, axes, pushed)
@@ -140,6 +191,9 @@ class SurfaceBody:
             raise InputError(f"{self.parts.label}: {error}") from None
         base, self._moved_by, self._shifted_by = self.model.compliance.held_for_good(self._axes, self._softness)
         self._columns = np.ascontiguousarray(base.matrix.T)  # a row: what a force on one axis does
+        own = np.diag(self._columns)
+        self._gives = own > FIRM * own.max()
+        self._answer = Answer(self._columns)
         self._asked = None
 
     def _target(self, k: int, time: float) -> np.ndarray:
@@ -154,47 +208,10 @@ class SurfaceBody:
         stretch = stretch - c.matrix[np.ix_(self._axes, axes)] @ pushed
         return self._holding.reactions(stretch, out_of_balance + c.balance[:, axes] @ pushed)
 
-    def _contact(self, alone: np.ndarray, dt: float, time: float, obstacles) -> tuple[np.ndarray, np.ndarray]:
-        """Contact forces on the axes (3m,) of the points that touch."""
-        self.contacts = 0
-        if not obstacles.count:
-            return np.zeros(0), np.zeros(0, dtype=int)
-        table = obstacles.table(time + dt, dt)
-        before, after = self._rest + self.u.reshape(-1, 3), self._rest + alone.reshape(-1, 3)
-        points, which = np.zeros(0, dtype=int), np.zeros(0, dtype=int)
-        frames, pushed, axes = np.zeros((0, 3, 3)), np.zeros(0), np.zeros(0, dtype=int)
-        for _ in range(PASSES):
-            gaps, normals = obstacles.gaps(table, before, after)
-            known = np.zeros(gaps.shape, dtype=bool)
-            known[points, which] = True
-            new, where = np.nonzero((gaps < 0) & ~known)
-            if not len(new):
-                break
-            points, which = np.r_[points, new], np.r_[which, where]
-            frames = np.concatenate([frames, frames_of(normals[new, where])])
-            axes = (3 * points[:, None] + np.arange(3)).ravel()
-            turned = np.einsum("mab,mbnc->manc", frames, self._gather(axes))
-            answer = np.einsum("manc,ndc->mand", turned, frames).reshape(len(axes), len(axes))
-            answer = 0.5 * (answer + answer.T)  # boundary elements are symmetric in the limit only
-            slip = (self._rest + alone.reshape(-1, 3))[points] - before[points]
-            slip -= obstacles.carried(table, which, before[points], dt)
-            end = np.einsum("mab,mb->ma", frames, slip)
-            # The gap without contact, along the normals that were found.
-            end[:, 0] = gaps[points, which] - np.einsum(
-                "mb,mb->m", frames[:, 0], after[points] - (self._rest + alone.reshape(-1, 3))[points]
-            )
-            local = contact_forces(answer, end, obstacles.friction[which])
-            pushed = np.einsum("mba,mb->ma", frames, local).ravel()
-            after = self._rest + (alone + pushed @ self._columns[axes]).reshape(-1, 3)
-        self.contacts = int((np.abs(pushed.reshape(-1, 3)).sum(axis=1) > 0).sum())
-        return _summed(axes, pushed)
 
-    def _gather(self, axes: np.ndarray) -> np.ndarray:
-        m = len(axes) // 3
-        return self._columns[axes][:, axes].T.reshape(m, 3, m, 3)
-
-
-def _summed(axes: np.ndarray, pushed: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Each axis once: a point may touch two colliders."""
+def _summed(acting: list[tuple[np.ndarray, np.ndarray]]) -> tuple[np.ndarray, np.ndarray]:
+    """Each axis once, and the forces on it: a point may touch two colliders."""
+    axes = np.concatenate([np.zeros(0, dtype=int), *(axes for axes, _ in acting)])
+    forces = np.concatenate([np.zeros(0), *(forces for _, forces in acting)])
     once, at = np.unique(axes, return_inverse=True)
-    return np.bincount(at, pushed, minlength=len(once)), once
+    return np.bincount(at, forces, minlength=len(once)), once

@@ -11,6 +11,7 @@ from functools import cached_property
 
 import numpy as np
 
+from taichifem.description import Material
 from taichifem.errors import InputError
 from taichifem.reduced.boundary_elements import BoundaryElements, Inside
 from taichifem.reduced.compliance import Compliance
@@ -29,7 +30,12 @@ class CondensedSurface:
         # Nodes that pins or handles take hold of stay as well.
         self.nodes = np.unique(np.concatenate([parts.skin, *(g.nodes for g in (*parts.pins, *parts.handles))]))
         self._body = Condensation(parts.stiffness, parts.rest, parts.masses, self.nodes)
-        material = parts.material
+        self._inner = np.zeros((len(self._body.inner), 3))
+        self._answer_to(parts.material)
+
+    def _answer_to(self, material: Material) -> None:
+        """Invert what resists forces."""
+        dt = self._dt
         if dt is None:
             self.compliance = self._body.compliance()
         else:
@@ -43,8 +49,13 @@ class CondensedSurface:
             if material.mass_damping or material.stiffness_damping:
                 drag = material.mass_damping * mass + material.stiffness_damping * self._body.stiffness
                 self._by_drag = self.compliance.matrix @ drag / dt
-        self._inner = np.zeros((len(self._body.inner), 3))
         self._acting: tuple | None = None
+
+    def set_material(self, material: Material) -> None:
+        """Another Young's modulus, other damping: inner nodes follow as before, and what is inverted is so anew."""
+        self._body.stiffen(material.youngs / self._parts.material.youngs)
+        self._parts = replace(self._parts, material=material)
+        self._answer_to(material)
 
     def free(self, gravity: np.ndarray, shares: Shares, u: np.ndarray, v: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """Displacement (3s,) [m] by the loads and, in motion, inertia, with what is out of balance (r,)."""
@@ -101,14 +112,29 @@ class BoundarySurface:
             )
         except InputError as error:
             raise InputError(f"{parts.label}: {error}") from None
-        by_force = np.repeat(1 / self.elements.weights, 3)
-        bare = self.elements.compliance
-        self.compliance: Compliance = replace(bare, matrix=bare.matrix * by_force, balance=bare.balance * by_force)
-        self._by_force = by_force
+        self._by_force = np.repeat(1 / self.elements.weights, 3)
+        self._invert()
         self.tractions = np.zeros((len(parts.surface), 3))
         self._gravity = np.zeros(3)
         self._acting: tuple | None = None
         self._inner = np.setdiff1d(np.arange(len(parts.rest)), self.nodes)
+        self._inside: Inside | None = None
+
+    def _invert(self) -> None:
+        bare = self.elements.compliance
+        self.compliance: Compliance = replace(
+            bare, matrix=bare.matrix * self._by_force, balance=bare.balance * self._by_force
+        )
+
+    def set_material(self, material: Material) -> None:
+        """Another Young's modulus."""
+        softer = self._parts.material.youngs / material.youngs
+        self._parts = replace(self._parts, material=material)
+        self.elements.stiffen(material.youngs)
+        self._invert()
+        self._acting = None
+        if self._inside is not None:
+            self._inside = self._inside.scaled(softer)
 
     @cached_property
     def _loads(self) -> list[np.ndarray]:
@@ -167,14 +193,11 @@ class BoundarySurface:
         around = (self._by_force * forces).reshape(-1, 3)
         own = found[self.nodes] - self._hanging(e.points)
         if len(self._inner):
+            if self._inside is None:  # for whoever asks for inner nodes: made when that happens first
+                self._inside = e.inside(rest[self._inner]).single()
             found[self._inner] = self._inside.displacement(own, around, self.tractions)
             found[self._inner] += self._hanging(rest[self._inner])
         return found
-
-    @cached_property
-    def _inside(self) -> Inside:
-        """For whoever asks for inner nodes: made when that happens first."""
-        return self.elements.inside(self._parts.rest[self._inner])
 
     def velocities(self, v: np.ndarray) -> np.ndarray:
         """Of all nodes (n,3) [m/s]: inner ones do not count, the model has no inertia."""

@@ -39,6 +39,7 @@ def test_interactions_and_a_checkpoint_exclude_each_other(tiny):
     assert_refused(call("run", tiny, "--replay", "a.json"), "a.json: cannot be read")
 
 
-def test_reduced_bodies_are_refused_with_what_to_use(tiny):
-    modal = call("live", tiny, "--no-browser", "--port", 0, "--set", "body.0.material.model=modal")
-    assert_refused(modal, "'modal' cannot be taken hold of", "body.0.material.model=linear")
+def test_reduced_bodies_are_refused_what_their_model_cannot(tiny):
+    changes = "body.0.material.model=modal", "simulation.integrator=quasi-static"
+    modal = call("live", tiny, "--no-browser", "--port", 0, "--set", changes[0], "--set", changes[1])
+    assert_refused(modal, "has no inertia", 'use model = "condensed"')

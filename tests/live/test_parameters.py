@@ -7,7 +7,8 @@ import pytest
 import taichifem as tf
 from taichifem import InputError
 from taichifem.live import parameters
-from taichifem.live.parameters import MATERIAL, SIMULATION, as_overrides, changed, differences, find, get, panel
+from taichifem.live.panel import panel
+from taichifem.live.parameters import MATERIAL, SIMULATION, as_overrides, changed, differences, find, get
 from taichifem.live.tools import tools_for
 from taichifem.scene import read_scene
 

@@ -99,7 +99,7 @@ def test_a_ball_pokes_and_lets_go(model):
     for _ in range(30):
         simulation.step()
         center = np.array([0.6, 0.1, 0.36]) + motion.at(simulation.time)[1]
-        assert np.linalg.norm(simulation.positions - center, axis=1).min() > 0.1 - 1e-4
+        assert np.linalg.norm(simulation.positions - center, axis=1).min() > 0.1 - 1e-5
         lowest, touched = min(lowest, moved(simulation)[:, 2].min()), max(touched, simulation.contacts)
     assert lowest < -0.015
     assert touched >= 1

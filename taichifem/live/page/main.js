@@ -69,6 +69,7 @@ const told = {
   },
   panel({ groups }) {
     panel.show(groups);
+    document.querySelector('[data-tool=throw]').hidden = panel.value('tools.ball_radius') === undefined;
     view.wire = panel.value('view.wire');
     view.stale = true;
     const down = panel.value('simulation.gravity.z');
@@ -156,6 +157,7 @@ const press = {
 'pull pin poke throw look'.split(' ').forEach((tool, k) => { press[k + 1] = () => choose(tool); });
 
 function choose(tool) {
+  if (document.querySelector(`[data-tool=${tool}]`).hidden) return; // the scene's bodies meet no ball
   hand.tool = tool;
   document.querySelectorAll('[data-tool]').forEach((b) => b.classList.toggle('on', b.dataset.tool === tool));
 }
