@@ -109,6 +109,7 @@ class World:
         self.corner_pairs = self.corners * (self.corners + 1) // 2
         self.precision = precision
         self.real = runtime.PRECISIONS[precision]
+        self.companions: dict = {}  # fields that only some scenes have, made when the first of them wants them
         self._builder = ti.FieldsBuilder()
         self._place_nodes()
         self._place_elements()

@@ -196,15 +196,13 @@ def write_contacts(r: ti.template(), order: _array(), slip: _array(), pressed: _
         r.close[q] = 1
 
 
-_made: dict[tuple[int, int, int], Riders] = {}
-
-
 def riders_of(w: World, element: np.ndarray, weights: np.ndarray) -> Riders:
     """The vertices in the elements (p,), sorted, with weights (p,4); fields are made once for each room."""
     cells, first, of = np.unique(element, return_index=True, return_inverse=True)
     room = round_up(len(element), 256), round_up(len(cells), 64)
-    key = id(w), *room
-    riders = _made[key] = _made.get(key) or Riders(w, *room)
+    if room not in w.companions:
+        w.companions[room] = Riders(w, *room)
+    riders = w.companions[room]
     first = np.append(first, len(element)).astype(np.int32)
     given = np.ascontiguousarray(weights, dtype=dtype_of(w))
     _fill(w, riders, cells.astype(np.int32), first, of.astype(np.int32), given)
