@@ -167,13 +167,15 @@ def regroup(cells: np.ndarray, body: np.ndarray, piece: np.ndarray, levels: int)
 def _number(labels: list[np.ndarray], piece: np.ndarray, body: np.ndarray) -> tuple[Aggregates, np.ndarray]:
     """Number the labels (n,) of all levels through, each a range of those below; and where pieces begin."""
     of, n = np.int32, len(body)
-    keys = []
-    for label in labels:
-        # Those of one piece follow one another; of groups of pieces, the first one counts.
-        lead = np.full(label.max() + 1, n)
-        np.minimum.at(lead, label, piece)
-        keys += [label, lead[label]]
-    order = np.lexsort((*keys, body))
+    above, place = body, np.arange(int(body.max()) + 1)
+    for label in reversed(labels):
+        # Those of one piece follow one another; of groups of pieces, any one counts.
+        k = int(label.max()) + 1
+        belongs, lead = np.empty(k, dtype=np.int64), np.empty(k, dtype=np.int64)
+        belongs[label], lead[label] = place[above], piece
+        place, above = np.empty(k, dtype=np.int64), label
+        place[np.lexsort((lead, belongs))] = np.arange(k)
+    order = np.argsort(place[above], kind="stable")
     first, begin, end, parent, below = [0], [], [], [], np.arange(n)
     for label in labels:
         starts = np.flatnonzero(np.r_[True, np.diff(label[order]) != 0])
