@@ -244,7 +244,8 @@ class World:
         self.pressed = ti.field(self.real)  # normal force that friction was last set for [N]
         self.touching = ti.field(ti.i32)
         self._builder.dense(ti.ij, (k, c.nodes)).place(self.slip)
-        self._builder.dense(ti.ij, (k, c.nodes)).place(self.pressed, self.touching)
+        self.grip = ti.field(self.real)  # stiffness of the friction spring that was solved with [N/m]
+        self._builder.dense(ti.ij, (k, c.nodes)).place(self.pressed, self.touching, self.grip)
 
     def _place_meetings(self) -> None:
         """For contact between pieces (`processes.meeting`), where there may be any."""

@@ -12,6 +12,9 @@ from taichifem.processes import contact, holding
 CONTACT_PASSES = 8
 FRICTION_RENEWALS = 2
 
+TOLERANCE = 0.03
+"""Relative error of the forces of contacts, root mean square, at which they count as settled."""
+
 SLACK = 100.0
 """Times the tolerance of the linear solver: enough to tell which contacts open and close; the last solve has none."""
 
@@ -30,14 +33,14 @@ def settle(
         step.riding.begin()
     for passes in range(1, CONTACT_PASSES + 1):
         with step.timer.phase("contact"):
-            changed = springs(step, h)
-            if passes > 1 and not changed:
+            excess = springs(step, h, weight)
+            if passes > 1 and excess <= 0:
                 renewals += 1
-                if renewals > FRICTION_RENEWALS or not _press(step, h, weight):
+                if renewals > FRICTION_RENEWALS or _press(step, h, weight) <= 0:
                     if slack == 1:
                         break
                     slack = 1.0
-                springs(step, h)
+                springs(step, h, weight)
             if passes == CONTACT_PASSES:
                 slack = 1.0
         done = solve(passes, slack)
@@ -50,8 +53,8 @@ def settle(
     return done
 
 
-def springs(step: Step, h: float) -> int:
-    """Handles and contacts for the solution so far; how many contacts changed."""
+def springs(step: Step, h: float, weight: float = 0.0) -> int:
+    """Handles and contacts for the solution so far; the excess of error of those of the last call."""
     w, counts = step.w, step.counts
     acting = bool(counts.pulled or counts.colliders or counts.meetings)
     if not (acting or counts.sprung):
@@ -61,14 +64,20 @@ def springs(step: Step, h: float) -> int:
     holding.pull(w, counts.pulled, h)
     if counts.meetings:
         meeting_elements.push(w, counts.meetings, h)
-    changed = contact.touch(w, counts.nodes, counts.colliders, h, step.dt) if counts.colliders else 0
-    return changed + (step.riding.touch(w, counts, h, step.dt) if step.riding is not None else 0)
+    excess = 0
+    if counts.colliders:
+        excess += contact.touch(w, counts.nodes, counts.colliders, h, step.dt, weight, TOLERANCE)
+    if step.riding is not None:
+        excess += step.riding.touch(w, counts, h, step.dt, weight, TOLERANCE)
+    return excess
 
 
 def _press(step: Step, h: float, weight: float) -> int:
-    """Renew the normal forces that limit friction; for how many contacts that matters."""
-    changed = contact.press(step.w, step.counts.nodes, step.counts.colliders, h, step.dt, weight)
-    return changed + (step.riding.press(step.w, step.counts, h, step.dt, weight) if step.riding is not None else 0)
+    """Renew the normal forces that limit friction; the excess of their error."""
+    excess = contact.press(step.w, step.counts.nodes, step.counts.colliders, h, step.dt, weight, TOLERANCE)
+    if step.riding is not None:
+        excess += step.riding.press(step.w, step.counts, h, step.dt, weight, TOLERANCE)
+    return excess
 
 
 def friction(step: Step, h: float) -> None:

@@ -27,7 +27,8 @@ class Riders:
     Of a tetrahedron that holds some: `cell`, its number in the world; `first` of its vertices; `reach`, how far they
     lie from its middle at most, in terms of its farthest node; `close`, is it near a collider?  Of a vertex: `of`, its
     tetrahedron here; `weight`; `share` of each of its nodes that is its own (`riding`); what its contacts
-    add to the matrix (`stiff`) and to the load (`push`); `acting`.  As in `World`: `slip`, `pressed`, `touching`.
+    add to the matrix (`stiff`) and to the load (`push`); `acting`.  As in `World`: `slip`, `pressed`, `touching`,
+    `grip`.
     `near_cell`, `near`, `near_count`: lists of what is near.  `crowd` of a node: weights that act on it.
     `kept`, `kept_at`, `kept_count`: blocks of the matrix as they were assembled.
     """
@@ -61,7 +62,8 @@ class Riders:
         self.crowd = scalar(w.capacity.nodes)
         self.kept, self.kept_at, self.kept_count = matrix(12 * cells), scalar(12 * cells, ti.i32), scalar(1, ti.i32)
         self.slip, self.pressed, self.touching = ti.Vector.field(3, real), ti.field(real), ti.field(ti.i32)
-        builder.dense(ti.ij, (colliders, riders)).place(self.slip, self.pressed, self.touching)
+        self.grip = ti.field(real)
+        builder.dense(ti.ij, (colliders, riders)).place(self.slip, self.pressed, self.touching, self.grip)
         builder.finalize()
 
 

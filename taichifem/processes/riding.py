@@ -38,10 +38,28 @@ def _state(w: ti.template(), r: ti.template(), c: ti.i32, p: ti.i32, k, h, dt, v
     return contact.state_of(w, c, start, base, velocity, k, r.slip[c, p], r.pressed[c, p], h, dt)
 
 
+@ti.func
+def _mass(w: ti.template(), r: ti.template(), p: ti.i32):
+    """The mass [kg] of vertex p's shares."""
+    total = ti.cast(0.0, w.real)
+    for a in range(4):
+        total += r.share[p][a] * w.mass[w.cell[r.cell[r.of[p]]][a]]
+    return total
+
+
 @ti.kernel
-def _touch(w: ti.template(), r: ti.template(), near: ti.i32, n_colliders: ti.i32, h: ti.f64, dt: ti.f64) -> ti.i32:
-    """What the springs of each vertex are at the end velocity guessed so far; how many contacts changed."""
-    changed = 0
+def _touch(
+    w: ti.template(),
+    r: ti.template(),
+    near: ti.i32,
+    n_colliders: ti.i32,
+    h: ti.f64,
+    dt: ti.f64,
+    weight: ti.f64,
+    share: ti.f64,
+) -> ti.i64:
+    """What the springs of each vertex are at the end velocity guessed so far; as `contact.touch`."""
+    total = ti.cast(0, ti.i64)
     for q in range(near):
         p = r.near[q]
         step, whole = ti.cast(h, w.real), ti.cast(dt, w.real)
@@ -52,15 +70,19 @@ def _touch(w: ti.template(), r: ti.template(), near: ti.i32, n_colliders: ti.i32
         r.push[p] = ti.Vector.zero(w.real, 3)
         for c in range(n_colliders):
             state, force, normal, stretch = _state(w, r, c, p, k, step, whole, end)
-            if state != r.touching[c, p]:
-                r.touching[c, p] = state
-                changed += 1
+            was, pressed = r.touching[c, p], r.pressed[c, p]
+            springs, side = ti.Matrix.zero(w.real, 3, 3), ti.cast(0.0, w.real)
             if state != contact.NONE:
-                springs, side = contact.springs_of(w, c, state, normal, stretch, k, r.pressed[c, p])
+                springs, side = contact.springs_of(w, c, state, normal, stretch, k, pressed)
+            wrong = contact.wrong_by(w, c, was, state, force, stretch, side, r.grip[c, p], pressed)
+            if state != contact.NONE or was != contact.NONE:
+                total += contact.excess(w, wrong, force, _mass(w, r, p), weight, share)
+            r.touching[c, p], r.grip[c, p] = state, side
+            if state != contact.NONE:
                 r.acting[p] = 1
                 r.stiff[p] += step * step * springs
                 r.push[p] += step * (force * normal - side * stretch)
-    return changed
+    return total
 
 
 @ti.func
@@ -147,24 +169,27 @@ def _hand_on(w: ti.template(), r: ti.template(), assembled: ti.i32, lumped: ti.i
 
 @ti.kernel
 def _press(
-    w: ti.template(), r: ti.template(), near: ti.i32, n_colliders: ti.i32, h: ti.f64, dt: ti.f64, weight: ti.f64
-) -> ti.i32:
+    w: ti.template(),
+    r: ti.template(),
+    near: ti.i32,
+    n_colliders: ti.i32,
+    h: ti.f64,
+    dt: ti.f64,
+    weight: ti.f64,
+    share: ti.f64,
+) -> ti.i64:
     """As `contact.press`."""
-    changed = 0
+    total = ti.cast(0, ti.i64)
     for q in range(near):
         p = r.near[q]
         step, whole = ti.cast(h, w.real), ti.cast(dt, w.real)
         end, k = at(w, r, p, w.v) + at(w, r, p, w.dv), _stiffness(w, r, p, step)
-        mass = ti.cast(0.0, w.real)
-        for a in range(4):
-            mass += r.share[p][a] * w.mass[w.cell[r.cell[r.of[p]]][a]]
         for c in range(n_colliders):
-            force = _state(w, r, c, p, k, step, whole, end)[1]
-            share = ti.cast(contact.FRICTION_TOLERANCE, w.real)
-            if ti.abs(force - r.pressed[c, p]) > share * (force + mass * ti.cast(weight, w.real)):
-                changed += 1
+            force = ti.max(_state(w, r, c, p, k, step, whole, end)[1], 0.0)
+            if force > 0 or r.pressed[c, p] > 0:
+                total += contact.excess(w, ti.abs(force - r.pressed[c, p]), force, _mass(w, r, p), weight, share)
             r.pressed[c, p] = force
-    return changed
+    return total
 
 
 @ti.kernel
@@ -176,6 +201,7 @@ def _slide(w: ti.template(), r: ti.template(), near: ti.i32, n_colliders: ti.i32
         end, k = at(w, r, p, w.v), _stiffness(w, r, p, step)
         for c in range(n_colliders):
             state, force, _, stretch = _state(w, r, c, p, k, step, whole, end)
+            force = ti.max(force, 0.0)
             most, held = w.collider_friction[c] * force, k * stretch.norm()
             if held > most:
                 stretch *= most / held
@@ -204,18 +230,18 @@ class Riding:
         """The matrix has been assembled."""
         self._assembled = True
 
-    def touch(self, w: World, counts: Counts, h: float, dt: float) -> int:
+    def touch(self, w: World, counts: Counts, h: float, dt: float, weight: float, share: float) -> int:
         """As `contact.touch`."""
         if not counts.riding:
             return 0
-        changed = _touch(w, self._riders, counts.riding, counts.colliders, h, dt)
+        excess = _touch(w, self._riders, counts.riding, counts.colliders, h, dt, weight, share)
         _hand_on(w, self._riders, self._assembled, self._lumped)
         self._assembled = False
-        return changed
+        return excess
 
-    def press(self, w: World, counts: Counts, h: float, dt: float, weight: float) -> int:
+    def press(self, w: World, counts: Counts, h: float, dt: float, weight: float, share: float) -> int:
         """As `contact.press`."""
-        return _press(w, self._riders, counts.riding, counts.colliders, h, dt, weight) if counts.riding else 0
+        return _press(w, self._riders, counts.riding, counts.colliders, h, dt, weight, share) if counts.riding else 0
 
     def slide(self, w: World, counts: Counts, h: float, dt: float) -> None:
         """As `contact.slide`."""

@@ -109,3 +109,29 @@ def test_momentum_balances_the_weight_on_the_ground():
         assert now <= energy + 1e-3
         energy = now
     assert simulation.positions[:, 2].min() > -1e-3
+
+
+def test_many_bodies_come_to_rest_and_steps_then_settle_at_once():
+    """Some of many contacts are always on the verge of slipping: they neither let a body creep nor hold steps up."""
+    angle, rng = np.radians(20), np.random.default_rng(0)
+    plane = tf.PlaneCollider(normal=(-np.sin(angle), 0, np.cos(angle)), friction=0.5)
+    mesh = tf.TetMesh.bar(size=(0.2, 0.2, 0.1), cells=(4, 4, 2))
+    bodies = [
+        tf.Body(
+            mesh=mesh,
+            material=tf.Material(youngs=10 ** rng.uniform(5, 7), poisson=0.3),
+            position=(0.4 * i, 0.4 * j, 0.02 + 0.4 * i * np.tan(angle)),
+            velocity=tuple(0.5 * rng.normal(size=3)),
+        )
+        for i in range(3)
+        for j in range(4)
+    ]
+    simulation = tf.Simulation(tf.Scene(bodies=bodies, colliders=[plane]))
+    simulation.advance(seconds=3)
+    before, passes = simulation.positions, []
+    for _ in range(60):
+        simulation.step()
+        passes.append(simulation.report.contact_passes)
+    assert np.abs(simulation.positions - before).max() < 1e-6
+    assert simulation.stats.max_speed < 3e-5
+    assert np.mean(passes) < 3
