@@ -5,20 +5,28 @@ from __future__ import annotations
 import numpy as np
 import scipy.linalg
 
+FIRM = 1e-9
+"""Of the largest flexibility: axes that give way less are held by pins."""
+
 
 class Answer:
     """columns (3s,3s): row i says where a force on axis i takes all axes [m/N], while pins and handles hold.
 
     Hands hold `axes` (h,) besides: what they pull with is worked out from the few rows that are theirs.
+    unpinned (3s,): axes that pins leave free.  gives (3s,): those that firm hands leave free as well.
     """
 
     def __init__(self, columns: np.ndarray) -> None:
         self._columns = columns
+        own = np.diag(columns)
+        self.unpinned = own > FIRM * own.max()
         self.hold(np.zeros(0, dtype=int), np.zeros(0))
 
     def hold(self, axes: np.ndarray, softness: np.ndarray) -> None:
         """Have hands on the axes (h,) from now on, which give way by `softness` (h,) [m/N]; 0 is firm."""
         self.axes, self._softness = axes, softness
+        self.gives = self.unpinned.copy()
+        self.gives[axes[softness == 0]] = False
         if len(axes):
             self._rows = self._columns[axes]
             held = self._rows[:, axes].T + np.diag(softness)

@@ -14,9 +14,6 @@ from taichifem.reduced.surface_contact import SurfaceContact
 from taichifem.reduced.surface_models import BoundarySurface, CondensedSurface
 from taichifem.surroundings import pose
 
-FIRM = 1e-9
-"""Of the largest flexibility: axes that give way less are held by pins."""
-
 
 class SurfaceBody:
     """One body of a scene. u: displacement of the surface (3s,) [m], v: its velocity."""
@@ -148,8 +145,8 @@ class SurfaceBody:
             acting.append((self._on(grip.pushed), grip.forces.ravel()))
             alone = alone + acting[0][1] @ self._columns[acting[0][0]]
         axes, softness, targets = self._on(grip.held), np.repeat(grip.softness, 3), grip.targets.ravel()
-        gives = self._gives[axes]  # what pins hold is not the hands'
-        axes, softness, targets = axes[gives], softness[gives], targets[gives]
+        free = self._answer.unpinned[axes]  # what pins hold is not the hands'
+        axes, softness, targets = axes[free], softness[free], targets[free]
         if not self._answer.holds(axes, softness):
             self._answer.hold(axes, softness)
         if len(axes):
@@ -191,8 +188,6 @@ class SurfaceBody:
             raise InputError(f"{self.parts.label}: {error}") from None
         base, self._moved_by, self._shifted_by = self.model.compliance.held_for_good(self._axes, self._softness)
         self._columns = np.ascontiguousarray(base.matrix.T)  # a row: what a force on one axis does
-        own = np.diag(self._columns)
-        self._gives = own > FIRM * own.max()
         self._answer = Answer(self._columns)
         self._asked = None
 

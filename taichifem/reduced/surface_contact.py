@@ -13,6 +13,9 @@ PASSES = 12
 PRECISE = 1e-5
 """Of the body's extent: error of a gap that another pass is made for. Colliders are curved, and frames follow them."""
 
+FIRM = 0.01
+"""Squared share of a normal that lies along axes which give way: with less, pins or hands hold the point against it."""
+
 
 class SurfaceContact:
     """The contacts of one body: points (m,), the colliders `which` (m,), and the forces `pushed` (m,3) [N]."""
@@ -41,7 +44,8 @@ class SurfaceContact:
         """Find the forces that keep points (s,3) out of the obstacles at the end of the step from `time` on [s].
 
         before: where the points are (s,3) [m].  alone: their displacement (3s,) without contact.
-        Obstacles are curved: each pass takes their planes from where the last one led.
+        Obstacles are curved: each pass takes their planes from where the last one led. Points that pins and firm hands
+        hold against an obstacle go where those take them.
         """
         table = obstacles.table(time + dt, dt)
         for _ in range(PASSES):
@@ -49,12 +53,12 @@ class SurfaceContact:
             moved = alone + answer.moved(self.axes, self.pushed.ravel())[0] if len(self.points) else alone
             after = self._rest + moved.reshape(-1, 3)
             gaps, normals = obstacles.gaps(table, before, after)
-            new = self._enter(gaps)
+            others = self._enter(gaps, _movable(answer, normals))
             gap, normal = gaps[self.points, self.which], normals[self.points, self.which]
             gap, normal = obstacles.standing(table, self.which, after[self.points], gap, normal)
             pushed = (self.pushed * normal).sum(axis=1) > 0
             wrong = np.where(pushed, np.abs(gap), -gap)
-            if not new and wrong.max(initial=0.0) <= self._precise:
+            if not others and wrong.max(initial=0.0) <= self._precise:
                 break
             slip = after[self.points] - before[self.points]
             slip -= obstacles.carried(table, self.which, before[self.points], dt)
@@ -62,14 +66,16 @@ class SurfaceContact:
         held = self.pushed.any(axis=1)
         self.points, self.which, self.pushed = self.points[held], self.which[held], self.pushed[held]
 
-    def _enter(self, gaps: np.ndarray) -> bool:
-        """Add the points that have gone into a collider; are there any?"""
-        inside = gaps < 0
+    def _enter(self, gaps: np.ndarray, movable: np.ndarray) -> bool:
+        """Add the points that have gone into a collider, drop those that cannot move; has that changed any?"""
+        stays = movable[self.points, self.which]
+        self.points, self.which, self.pushed = self.points[stays], self.which[stays], self.pushed[stays]
+        inside = (gaps < 0) & movable
         inside[self.points, self.which] = False
         points, which = np.nonzero(inside)
         self.points, self.which = np.r_[self.points, points], np.r_[self.which, which]
         self.pushed = np.concatenate([self.pushed, np.zeros((len(points), 3))])
-        return len(points) > 0
+        return len(points) > 0 or not stays.all()
 
     def _balance(self, answer: Answer, gap, slip, normal, friction) -> None:
         """The forces for gaps (m,), slips (m,3) and normals (m,3) seen under those of now."""
@@ -82,3 +88,8 @@ class SurfaceContact:
         forces = np.einsum("mab,mb->ma", frames, self.pushed)
         free = seen - (turned @ forces.ravel()).reshape(-1, 3)
         self.pushed = np.einsum("mba,mb->ma", frames, balanced_forces(turned, free, friction, forces))
+
+
+def _movable(answer: Answer, normals: np.ndarray) -> np.ndarray:
+    """Can points move along the normals (s,colliders,3)?"""
+    return (normals**2 * answer.gives.reshape(-1, 1, 3)).sum(axis=2) > FIRM

@@ -7,6 +7,8 @@ import pytest
 
 import taichifem as tf
 from taichifem.errors import InputError
+from taichifem.reduced import surface_contact
+from taichifem.reduced.active_set import balanced_forces
 
 BAR = tf.TetMesh.bar(size=(0.6, 0.2, 0.2), cells=(9, 3, 3))
 HELD = tf.BoxRegion(lower=(-1, -1, -1), upper=(1e-6, 1, 1))
@@ -128,3 +130,26 @@ def test_what_surface_bodies_refuse(model, change, message):
     with pytest.raises(InputError, match=message) as caught:
         tf.simulate(scene_of(model, **change))
     assert "\n" not in str(caught.value)
+
+
+@pytest.mark.parametrize("model", ["condensed", "bem"])
+def test_pinned_points_in_a_ball_do_not_hold_the_others_up(model, monkeypatch):
+    """The ball covers some of the pinned face: what can move gets out of its way, in a few passes."""
+    passes = []
+
+    def counted(*given):
+        passes.append(len(given[1]))
+        return balanced_forces(*given)
+
+    monkeypatch.setattr(surface_contact, "balanced_forces", counted)
+    way = tf.Motion(times=(0, 0.2), translation=((0, 0, 0), (0, 0, -0.05)))
+    ball = tf.SphereCollider(center=(0.05, 0.1, 0.36), radius=0.15, friction=0.3, motion=way)
+    simulation = tf.simulate(scene_of(model, colliders=[ball], gravity=(0, 0, 0)))
+    simulation.advance(seconds=0.2)
+    surface = np.unique(simulation.surface)
+    outside = np.linalg.norm(simulation.positions[surface] - (0.05, 0.1, 0.31), axis=1) - 0.15
+    pinned = BAR.points[surface][:, 0] < 1e-6
+    assert outside[pinned].min() < -0.01
+    assert outside[~pinned].min() > -1e-5
+    assert simulation.contacts > 1
+    assert len(passes) < 5 * (0.2 * simulation.scene.fps)
