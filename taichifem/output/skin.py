@@ -3,13 +3,15 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import cached_property
 from typing import Any
 
 import numpy as np
 from scipy.sparse import csr_array
 
+from taichifem.mesh.clipping import Inside, clip
 from taichifem.mesh.connectivity import boundary_faces
-from taichifem.mesh.embedded import Embedding, barycentric, closest_point, embed, winding_number
+from taichifem.mesh.embedded import Embedding, barycentric, embed
 
 
 @dataclass(frozen=True)
@@ -80,7 +82,7 @@ class Skin:
                 triangles, element, weight, kept = rider.crack(surface[opened], cells)
                 pieces = np.asarray(simulation.surface_pieces)[opened][kept]
                 parts.append((triangles + first, bodies[opened][kept], pieces, np.ones(len(triangles), bool)))
-                colors.append(np.full((len(triangles), 3), np.nan))
+                colors.append(np.tile(rider.colors.mean(axis=0), (len(triangles), 1)))  # what was inside goes with it
                 paint.append(np.full((len(element), 5), np.nan))
                 elements.append(element), weights.append(weight)
                 first += len(element)
@@ -120,6 +122,7 @@ class _Rider:
         self.body, self._of = number, cells
         self._nodes, self._whole = body.placed_points(), np.asarray(body.mesh.cells)
         self.points, self.triangles = body.placed(np.asarray(body.embed.points)), np.asarray(body.embed.triangles)
+        self._clipped: dict[tuple, np.ndarray] = {}
         self._own, self._weights = body.embedding.element, body.embedding.weights
         self._home = embed(self.points[self.triangles].mean(axis=1), self._nodes, self._whole).element
         self.home = cells[self._home]
@@ -129,6 +132,10 @@ class _Rider:
         self.colors = (
             np.full((len(self.triangles), 3), np.nan) if shades is None else shades[self.triangles].mean(axis=1)
         )
+
+    @cached_property
+    def _inside(self) -> Inside:
+        return Inside(self.points, self.triangles)
 
     def _in(self, points: np.ndarray, element: np.ndarray) -> np.ndarray:
         corners = self._nodes[self._whole[element]]
@@ -160,30 +167,26 @@ class _Rider:
         weights = np.concatenate([self._weights, self._in(self.points[vertices], carriers)])
         return triangles.reshape(k, 3), self._of[element], weights
 
-    def _outside(self, points: np.ndarray) -> np.ndarray:
-        return winding_number(points, self.points, self.triangles) < 0.5
-
     def crack(self, faces: np.ndarray, cells: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
-        """Of the faces (f,3) that cracks opened those inside of the surface, drawn in where they would stick out.
+        """What of the faces (f,3) that cracks opened lies inside of the surface.
 
-        Corners (k,3) among riding points, those points' elements and weights, and which faces (f,) these are.
+        Triangles (k,3) of riding points, those points' elements and weights, and the face (k,) each triangle is of.
         """
         boundary, owner = boundary_faces(cells[self._of])
         place = {frozenset(face): e for face, e in zip(boundary.tolist(), owner.tolist(), strict=True)}
-        element = np.repeat([place[frozenset(face)] for face in faces.tolist()], 3)
-        corner = (cells[self._of][element] == faces.reshape(-1, 1)).argmax(axis=1)
-        at = self._nodes[self._whole[element, corner]]
-        outside = self._outside(at)
-        triangle = at.reshape(-1, 3, 3)
-        middles = 0.5 * (triangle + np.roll(triangle, 1, axis=1))
-        between = np.concatenate([middles, triangle.mean(axis=1, keepdims=True)], axis=1).reshape(-1, 3)
-        inside = ~np.concatenate([outside.reshape(-1, 3), self._outside(between).reshape(-1, 4)], axis=1)
-        kept = inside.any(axis=1)
-        corners = np.repeat(kept, 3)
-        at, element, outside = at[corners], element[corners], outside[corners]
-        moved, corners = at.copy(), self.points[self.triangles]
-        for i in np.flatnonzero(outside):
-            nearest = closest_point(at[i], corners)
-            moved[i] = nearest[((nearest - at[i]) ** 2).sum(axis=1).argmin()]
-        weights = self._in(moved, element)
-        return np.arange(len(at)).reshape(-1, 3), self._of[element], weights, kept
+        element = np.array([place[frozenset(face)] for face in faces.tolist()])
+        corner = (cells[self._of][element][:, None] == faces[:, :, None]).argmax(axis=2)
+        # Where a face lies in the mesh at rest never changes.
+        names = list(zip(element.tolist(), map(tuple, corner.tolist()), strict=True))
+        new = np.array([f for f, name in enumerate(names) if name not in self._clipped], dtype=int)
+        if len(new):
+            at = self._nodes[self._whole[element[new, None], corner[new]]]
+            parts, of = clip(at, self._inside)
+            for k, f in enumerate(new):
+                self._clipped[names[f]] = parts[of == k]
+        parts = [self._clipped[name] for name in names]
+        of = np.repeat(np.arange(len(faces)), [len(part) for part in parts])
+        weights = np.zeros((len(of), 3, 4))
+        weights[np.arange(len(of))[:, None, None], np.arange(3)[:, None], corner[of][:, None]] = np.concatenate(parts)
+        triangles = np.arange(3 * len(of)).reshape(-1, 3)
+        return triangles, self._of[np.repeat(element[of], 3)], weights.reshape(-1, 4), of

@@ -8,6 +8,7 @@ import pytest
 from scipy.spatial import cKDTree
 
 import taichifem as tf
+from taichifem.mesh.clipping import Inside
 from taichifem.output.export import open_export
 from taichifem.output.frame import FrameBuilder
 from taichifem.output.skin import Skin
@@ -118,6 +119,10 @@ def test_triangles_go_with_the_piece_that_holds_them():
     assert longest < 0.5 < points[:, 2].max() - 1.0
     assert longest < 6 * np.linalg.norm(rest - np.roll(rest, 1, axis=1), axis=2).max()
     assert seen.pieces.max() < simulation.piece_count
+    # What is drawn of the crack lies inside of the surface: its rim is that of the skin.
+    crack = seen.follow(simulation.rest_positions)[np.unique(seen.triangles[seen.cracked])]
+    depth = Inside(BEAR.points, BEAR.triangles).depth(crack)
+    assert depth.min() > -0.015 and depth.max() > 0.05
 
 
 def test_modal_bodies_touch_with_what_is_embedded():
