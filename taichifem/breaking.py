@@ -5,9 +5,9 @@ from __future__ import annotations
 import numpy as np
 
 from taichifem import carrying
-from taichifem.bodies import Bodies
 from taichifem.description import Scene
 from taichifem.errors import InputError
+from taichifem.measured_bodies import MeasuredBodies
 from taichifem.processes import fracture
 from taichifem.structure.pieces import label_pieces
 from taichifem.structure.splitting import Splitting
@@ -15,7 +15,7 @@ from taichifem.surface import Surface, split_surface
 from taichifem.topology import split_layout
 
 
-class BreakingBodies(Bodies):
+class BreakingBodies(MeasuredBodies):
     """Bodies whose elements may part. Nodes that come from splits follow those of the scene, in their order."""
 
     def __init__(self, scene: Scene, *, precision: str, arch: str | None, threads: int | None) -> None:
