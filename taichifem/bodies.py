@@ -95,6 +95,7 @@ class Bodies:
         """Give the world what follows from the mesh."""
         layout = self._layout
         self._counts.nodes, self._counts.elements = len(layout.rest), len(layout.cells)
+        self._counts.split = len(layout.rest) > len(self._whole.rest)
         # Springs were those of another mesh; what new nodes find in their places is someone else's.
         self._counts.meetings, self._counts.sprung = 0, True
         with self._kernels():

@@ -85,6 +85,7 @@ class Counts:
     riding: int = 0  # embedded vertices near colliders
     held: int = 0
     pulled: int = 0
+    split: bool = False  # has some of the mesh come apart?
     sprung: bool = True  # may some springs of handles or contact be left from the last step?
 
 
@@ -143,7 +144,7 @@ class World:
         self.mass, self.drag = self._scalar(n), self._scalar(n)
         self.force = self._vector(n, 3)  # elastic force [N]
         self.load = self._vector(n, 3)  # right-hand side of the step, without contact and handles [N s]
-        self.relaxed = self._vector(n, 3)  # where it would be without strain [m] (`linear_algebra.galerkin`)
+        self.relaxed = self._vector(n, 3)  # where it would be without strain [m], for `linear_algebra.galerkin`
         self.around = self._matrix(n, 3, 3)  # mean stress of the elements around [Pa]
         # Normal of the plane across which a node comes apart, and how far beyond its toughness (`processes.fracture`).
         self.parting = self._vector(n, 4)

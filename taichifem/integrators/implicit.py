@@ -22,7 +22,7 @@ from taichifem import elements
 from taichifem.integrators.constraints import friction, settle, springs
 from taichifem.integrators.step import Iteration, Step, StepReport
 from taichifem.linear_algebra import assembly, guess, pcg
-from taichifem.linear_algebra.galerkin import relax
+from taichifem.linear_algebra.galerkin import relax, stay
 from taichifem.processes import holding
 from taichifem.runtime import ti
 
@@ -200,7 +200,7 @@ def _linearise(step: Step, h: float, inertia: bool, *, first: bool = False, exac
         )
         _load(w, n, h, damped, *step.gravity)
         if step.plan.galerkin is not None:
-            relax(w, n, step.counts.elements)
+            relax(w, n, step.counts.elements) if step.counts.split else stay(w, n)
         if not first:
             _forget(w, n)
         holding.hold(w, n, step.counts.held, step.dt, h)

@@ -44,6 +44,13 @@ def relax(w: ti.template(), n: ti.i32, n_elements: ti.i32):
         w.relaxed[i] = elements.lifted(total / volume, w)
 
 
+@ti.kernel
+def stay(w: ti.template(), n: ti.i32):
+    """In place of `relax` where nothing has come apart: turns of large aggregates cost far more than their strain."""
+    for i in range(n):
+        w.relaxed[i] = w.x[i]
+
+
 @ti.func
 def arm(w: ti.template(), n: ti.i32, level: ti.i32, item: ti.i32):
     """From the centre of its aggregate to a node (level 0) or an aggregate, in units of the reach there."""
