@@ -24,6 +24,9 @@ DENSE = 96
 SIDES = 8
 """Shares of an operation that threads begin with: one for each, up to this many."""
 
+WAKING = 80_000
+"""Work [ns] that is not worth waking other threads for."""
+
 MEMORY = 3
 """Steps that a solve's start is guessed from."""
 
@@ -119,6 +122,10 @@ class World:
         self._place_surroundings()
         self._place_meetings()
         self._builder.finalize()
+
+    def alone(self, cost: float) -> bool:
+        """Is a loop over all nodes best left to one thread, at about `cost` [ns] a node?"""
+        return runtime.running_arch() == "cpu" and (runtime.threads() == 1 or self.capacity.nodes * cost < WAKING)
 
     def _scalar(self, size: int, dtype=None):
         field = ti.field(dtype or self.real)

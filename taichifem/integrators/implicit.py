@@ -47,6 +47,7 @@ ALWAYS = 1e30
 @ti.kernel
 def start(w: ti.template(), n: ti.i32):
     """Remember where the step begins, and go on from there: the base of backward Euler."""
+    ti.loop_config(serialize=ti.static(w.alone(30)))
     for i in range(n):
         guess.remember(w, i)
         w.dv[i] = guess.recall(w, i)
@@ -59,6 +60,7 @@ def start(w: ti.template(), n: ti.i32):
 @ti.kernel
 def go_back(w: ti.template(), n: ti.i32):
     """Undo a step that failed."""
+    ti.loop_config(serialize=ti.static(w.alone(10)))
     for i in range(n):
         w.x[i] = w.x0[i]
         w.v[i] = w.v0[i]
@@ -69,6 +71,7 @@ def go_back(w: ti.template(), n: ti.i32):
 def _load(w: ti.template(), n: ti.i32, h: ti.f64, inertia: ti.f64, gx: ti.f64, gy: ti.f64, gz: ti.f64):
     """Right-hand side of the step without contact and handles."""
     gravity = ti.Vector([gx, gy, gz])
+    ti.loop_config(serialize=ti.static(w.alone(80)))
     for i in range(n):
         step, share = ti.cast(h, w.real), ti.cast(inertia, w.real)
         w.force[i] = elements.gathered_force(w, i)
@@ -85,6 +88,7 @@ def _forget(w: ti.template(), n: ti.i32):
 
 @ti.kernel
 def _update(w: ti.template(), n: ti.i32, h: ti.f64):
+    ti.loop_config(serialize=ti.static(w.alone(5)))
     for i in range(n):
         w.v[i] += w.dv[i]
         w.x[i] = w.base_x[i] + ti.cast(h, w.real) * w.v[i]
@@ -94,6 +98,8 @@ def _update(w: ti.template(), n: ti.i32, h: ti.f64):
 @ti.kernel
 def _shorten(w: ti.template(), n: ti.i32, h: ti.f64, back: ti.f64):
     """Take back the part `back` of the last correction."""
+    ti.loop_config(serialize=ti.static(w.alone(10)))
+    ti.loop_config(serialize=ti.static(w.alone(10)))
     for i in range(n):
         w.v[i] -= ti.cast(back, w.real) * w.direction[i]
         w.x[i] = w.base_x[i] + ti.cast(h, w.real) * w.v[i]

@@ -47,6 +47,7 @@ def relax(w: ti.template(), n: ti.i32, n_elements: ti.i32):
 @ti.kernel
 def stay(w: ti.template(), n: ti.i32):
     """In place of `relax` where nothing has come apart: turns of large aggregates cost far more than their strain."""
+    ti.loop_config(serialize=ti.static(w.alone(5)))
     for i in range(n):
         w.relaxed[i] = w.x[i]
 
@@ -113,6 +114,7 @@ def _store(w: ti.template(), n: ti.i32, q: ti.i32, shift, right, turned, both):
 @ti.kernel
 def _gather_nodes(w: ti.template(), n: ti.i32, aggregates: ti.i32, pairs: ti.i32):
     """Level 1, from the matrix of the nodes."""
+    ti.loop_config(serialize=ti.static(w.alone(10)))
     for g in range(aggregates):
         _place(w, w.relaxed, True, g)
     for q in range(pairs):
@@ -136,8 +138,10 @@ def _gather_nodes(w: ti.template(), n: ti.i32, aggregates: ti.i32, pairs: ti.i32
 @ti.kernel
 def _gather_level(w: ti.template(), n: ti.i32, level: ti.i32, first: ti.i32, end: ti.i32, begin: ti.i32, last: ti.i32):
     """A level from that below: aggregates `first` to `end`, pairs `begin` to `last`."""
+    ti.loop_config(serialize=ti.static(w.alone(2)))
     for g in range(first, end):
         _place(w, w.centre, False, g)
+    ti.loop_config(serialize=ti.static(w.alone(20)))
     for q in range(begin, last):
         shift, right = ti.Matrix.zero(w.real, 3, 3), ti.Matrix.zero(w.real, 3, 3)
         turned, both = ti.Matrix.zero(w.real, 3, 3), ti.Matrix.zero(w.real, 3, 3)
@@ -227,6 +231,7 @@ def _invert_last(w: ti.template(), size: ti.i32):
 @ti.kernel
 def _invert(w: ti.template(), n: ti.i32, aggregates: ti.i32, whole: ti.i32):
     """The inverses of the aggregates' own matrices, and that of the last `whole` aggregates together."""
+    ti.loop_config(serialize=ti.static(w.alone(40)))
     for g in range(aggregates):
         _invert_own(w, n, g)
     ti.loop_config(serialize=True)

@@ -36,6 +36,7 @@ def recall(w: ti.template(), i: ti.i32):
 @ti.kernel
 def _mask(w: ti.template(), n: ti.i32):
     """Column 0 is what held axes will do; from what they did nothing follows."""
+    ti.loop_config(serialize=ti.static(w.alone(15)))
     for i in range(n):
         for a in ti.static(range(3)):
             w.past[i][a, 0] = (1 - w.free[i][a]) * w.dv[i][a]
@@ -99,6 +100,7 @@ def _project(w: ti.template(), n: ti.i32, pieces: ti.i32, tiny: ti.f64):
 @ti.kernel
 def _combine(w: ti.template(), n: ti.i32):
     """dv, and the residual that is left of the load."""
+    ti.loop_config(serialize=ti.static(w.alone(30)))
     for i in range(n):
         dv, product = ti.Vector.zero(w.real, 3), ti.Vector.zero(w.real, 3)
         for a in ti.static(range(3)):

@@ -65,7 +65,7 @@ def prepare(w: ti.template(), n: ti.i32, pieces: ti.i32, noise: ti.f64, weight: 
     `noise` times the diagonal's size is what rounding leaves of the forces: a right-hand side below that
     is not worth resolving further.
     """
-    ti.loop_config(block_dim=1)
+    ti.loop_config(block_dim=1, serialize=ti.static(w.alone(120)))
     for c in range(pieces):
         sums = ti.Vector.zero(ti.f64, 3)
         first, last = range_of(n, c, pieces)
@@ -103,7 +103,7 @@ def leave(w: ti.template(), i: ti.i32, product):
 @ti.kernel
 def begin(w: ti.template(), n: ti.i32, pieces: ti.i32):
     """Start from `w.dv`."""
-    ti.loop_config(block_dim=1)
+    ti.loop_config(block_dim=1, serialize=ti.static(w.alone(60)))
     for c in range(pieces):
         first, last = range_of(n, c, pieces)
         matrix.multiply(w, w.dv, w.product, first, last)

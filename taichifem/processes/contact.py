@@ -138,6 +138,7 @@ def touch(
     Returns the `excess` of the errors that those of the last call had, as contacts opened, closed or slipped since.
     """
     total = ti.cast(0, ti.i64)
+    ti.loop_config(serialize=ti.static(w.alone(100)))
     for i in range(n):
         step, whole = ti.cast(h, w.real), ti.cast(dt, w.real)
         end = w.v[i] + w.dv[i]
@@ -168,6 +169,7 @@ def press(
     Returns the `excess` of what they were wrong by.
     """
     total = ti.cast(0, ti.i64)
+    ti.loop_config(serialize=ti.static(w.alone(60)))
     for i in range(n):
         step, whole = ti.cast(h, w.real), ti.cast(dt, w.real)
         for c in range(n_colliders):
@@ -181,6 +183,7 @@ def press(
 @ti.kernel
 def slide(w: ti.template(), n: ti.i32, n_colliders: ti.i32, h: ti.f64, dt: ti.f64):
     """At the end of a step, keep the stretch of the friction springs, at most what friction can hold."""
+    ti.loop_config(serialize=ti.static(w.alone(80)))
     for i in range(n):
         step, whole = ti.cast(h, w.real), ti.cast(dt, w.real)
         for c in range(n_colliders):

@@ -11,6 +11,7 @@ def hold(w: ti.template(), n: ti.i32, n_held: ti.i32, dt: ti.f64, h: ti.f64):
     They get the mean velocity of the step, and a base from which `h` times that leads there: a method that goes on
     from past velocities would let them swing about their path. Planar bodies are held in their plane.
     """
+    ti.loop_config(serialize=ti.static(w.alone(5)))
     for i in range(n):
         w.free[i] = ti.Vector.one(w.real, 3)
         if ti.static(w.d == 2):
@@ -50,6 +51,7 @@ def pull(w: ti.template(), n_pulled: ti.i32, h: ti.f64):
 @ti.kernel
 def clear_springs(w: ti.template(), n: ti.i32):
     """Forget the springs of the last step."""
+    ti.loop_config(serialize=ti.static(w.alone(10)))
     for i in range(n):
         w.spring[i] = ti.Matrix.zero(w.real, 3, 3)
         w.spring_load[i] = ti.Vector.zero(w.real, 3)
