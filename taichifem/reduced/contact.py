@@ -28,39 +28,47 @@ def frames_of(normals: np.ndarray) -> np.ndarray:
 
 
 @ti.kernel
-def _sweep(D: _array(), d: _array(), friction: _array(), most: _array(), f: _array(), pulls: ti.i32) -> ti.i32:
-    """Improve the forces f (m,3); returns how often. pulls: normal forces of either sign, friction at `most`."""
-    m = d.shape[0]
+def _sweep(data: _array(), m: ti.i32, pulls: ti.i32) -> ti.i32:
+    """Improve the forces f (m,3); returns how often. pulls: normal forces of either sign, friction at `most`.
+
+    data: rows of D (3m,3m), and behind them d (m,3), friction (m,), most (m,) and f: to hand an array over takes longer
+    than a sweep over some contacts.
+    """
     done = 0
     ti.loop_config(serialize=True)
     for _ in range(1):
+        wide, d = 3 * m, 9 * m * m
+        friction, most, f = d + 3 * m, d + 4 * m, d + 5 * m
         change, size = ti.f64(1.0), ti.f64(0.0)
         while done < SWEEPS and change > TOLERANCE * size:
             change, size = 0.0, 0.0
             done += 1
             for i in range(m):
-                v = ti.Vector([d[i, 0], d[i, 1], d[i, 2]])
-                for j in range(m):
-                    for a, b in ti.static(ti.ndrange(3, 3)):
-                        v[a] += D[3 * i + a, 3 * j + b] * f[j, b]
-                pushed = f[i, 0] - v[0] / D[3 * i, 3 * i]
+                v = ti.Vector([data[d + 3 * i], data[d + 3 * i + 1], data[d + 3 * i + 2]])
+                row = 3 * i * wide
+                for j in range(wide):
+                    for a in ti.static(range(3)):
+                        v[a] += data[row + a * wide + j] * data[f + j]
+                own = row + 3 * i  # the block of the point with itself
+                pushed = data[f + 3 * i] - v[0] / data[own]
                 if pulls == 0:
                     pushed = ti.max(pushed, 0.0)
-                step = pushed - f[i, 0]
+                step = pushed - data[f + 3 * i]
                 for a in ti.static(range(1, 3)):
-                    v[a] += D[3 * i + a, 3 * i] * step
+                    v[a] += data[own + a * wide] * step
                 # The largest eigenvalue of the tangential block.
-                one, other, mixed = D[3 * i + 1, 3 * i + 1], D[3 * i + 2, 3 * i + 2], D[3 * i + 1, 3 * i + 2]
+                one, other, mixed = data[own + wide + 1], data[own + 2 * wide + 2], data[own + wide + 2]
                 stiff = 0.5 * (one + other) + ti.sqrt(0.25 * (one - other) ** 2 + mixed * mixed)
-                side = ti.Vector([f[i, 1] - v[1] / stiff, f[i, 2] - v[2] / stiff])
-                bound = most[i] + friction[i] * ti.max(pushed, 0.0)
+                side = ti.Vector([data[f + 3 * i + 1] - v[1] / stiff, data[f + 3 * i + 2] - v[2] / stiff])
+                bound = data[most + i] + data[friction + i] * ti.max(pushed, 0.0)
                 if side.norm() > bound:
                     side *= bound / side.norm()
-                change = ti.max(change, ti.abs(step), ti.abs(side[0] - f[i, 1]), ti.abs(side[1] - f[i, 2]))
+                turn = ti.max(ti.abs(side[0] - data[f + 3 * i + 1]), ti.abs(side[1] - data[f + 3 * i + 2]))
+                change = ti.max(change, ti.abs(step), turn)
                 size = ti.max(size, ti.abs(pushed))
-                f[i, 0] = pushed
-                f[i, 1] = side[0]
-                f[i, 2] = side[1]
+                data[f + 3 * i] = pushed
+                data[f + 3 * i + 1] = side[0]
+                data[f + 3 * i + 2] = side[1]
     return done
 
 
@@ -87,9 +95,10 @@ def stopping_impulses(answer: np.ndarray, velocity: np.ndarray, most: np.ndarray
 def _solve(answer, end, friction, most, forces, *, pulls: bool) -> np.ndarray:
     # A point that nothing can move along some axis would be divided by zero.
     answer = answer + 1e-12 * np.abs(answer).max() * np.eye(len(answer))
-    given = (np.ascontiguousarray(array, dtype=np.float64) for array in (end, friction, most))
+    everything = np.concatenate([np.ravel(part) for part in (answer, end, friction, most, forces)], dtype=np.float64)
     with runtime.precision_of("f64"):
-        _sweep(answer, *given, forces, int(pulls))
+        _sweep(everything, len(end), int(pulls))
+    forces = everything[len(everything) - end.size :].reshape(end.shape)
     flat = forces.ravel()
     # Impulses are judged by the kinetic energy that they add, forces by the work that they do.
     work, against = (0.5 if pulls else 1.0) * flat @ (answer @ flat), -flat @ end.ravel()

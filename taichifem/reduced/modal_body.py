@@ -183,8 +183,7 @@ class ModalBody:
         if len(grip.pushed):
             push = push + np.einsum("nar,na->r", self._nodes.part(grip.pushed).levers(self.keep()), grip.forces)
         push = push + self._pull(dt, time, push, grip)
-        push = self.touch.press(self, push, dt, time, obstacles)
-        self.frame, self.modes.q, self.modes.v = self.trial(dt, push)
+        self.frame, self.modes.q, self.modes.v = self.touch.press(self, push, dt, time, obstacles)
         self.touch.stop(self, dt)
         self.contacts = self.touch.count
 

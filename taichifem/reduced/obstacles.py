@@ -10,25 +10,31 @@ from taichifem.runtime import ti
 from taichifem.surroundings import collider_table
 
 _array = ti.types.ndarray
+COLUMNS = 35
+"""Of a row of `surroundings.collider_table`."""
 
 
 @ti.kernel
-def _gaps(table: _array(), ends: _array(), found: _array()):
-    # A few thousand points at most: to wake threads up takes longer; so does handing over more arrays.
+def _gaps(data: _array(), n: ti.i32, colliders: ti.i32):
+    """data: rows of the table (colliders,35), start and end of the points (2,n,3), and room for gaps and normals
+    (n,colliders,4), behind one another: every array that is handed over takes as long as the gaps of a thousand points.
+    """
+    # A few thousand points at most: to wake threads up takes longer.
     ti.loop_config(serialize=True)
-    for i, c in ti.ndrange(ends.shape[1], table.shape[0]):
+    for i, c in ti.ndrange(n, colliders):
         start, end = ti.Vector.zero(ti.f64, 3), ti.Vector.zero(ti.f64, 3)
         size, normal = ti.Vector.zero(ti.f64, 3), ti.Vector.zero(ti.f64, 3)
         R0, R1 = ti.Matrix.zero(ti.f64, 3, 3), ti.Matrix.zero(ti.f64, 3, 3)
+        row, point = COLUMNS * c, COLUMNS * colliders + 3 * i
         for a in ti.static(range(3)):
-            start[a] = ends[0, i, a] - table[c, 14 + a]
-            end[a] = ends[1, i, a] - table[c, 5 + a]
-            size[a] = table[c, 2 + a]
+            start[a] = data[point + a] - data[row + 14 + a]
+            end[a] = data[point + 3 * n + a] - data[row + 5 + a]
+            size[a] = data[row + 2 + a]
             for b in ti.static(range(3)):
-                R1[a, b] = table[c, 17 + 3 * a + b]
-                R0[a, b] = table[c, 26 + 3 * a + b]
+                R1[a, b] = data[row + 17 + 3 * a + b]
+                R0[a, b] = data[row + 26 + 3 * a + b]
         p0, p1 = R0.transpose() @ start, R1.transpose() @ end
-        kind = ti.cast(table[c, 0], ti.i32)
+        kind = ti.cast(data[row], ti.i32)
         gap, local = collision.gap_to_half_space(p1)
         normal = ti.cast(local, ti.f64)
         if kind == collision.SPHERE:
@@ -36,9 +42,10 @@ def _gaps(table: _array(), ends: _array(), found: _array()):
         elif kind == collision.BOX:
             gap, normal = collision.gap_to_box(p0, p1, 0.5 * size)
         outward = R1 @ normal
-        found[i, c, 0] = gap
+        found = COLUMNS * colliders + 6 * n + 4 * (colliders * i + c)
+        data[found] = gap
         for a in ti.static(range(3)):
-            found[i, c, 1 + a] = outward[a]
+            data[found + 1 + a] = outward[a]
 
 
 class Obstacles:
@@ -48,10 +55,15 @@ class Obstacles:
         self.count = len(scene.colliders)
         self._scene = scene
         self.friction = np.array([collider.friction for collider in scene.colliders])
+        self._tables: dict[tuple[float, float], np.ndarray] = {}
 
     def table(self, time: float, dt: float) -> np.ndarray:
         """Where they stand at `time` [s], the end of a step of dt [s] (`surroundings.collider_table`)."""
-        return collider_table(self._scene.colliders, time, dt)
+        if (time, dt) not in self._tables:
+            # A step looks at its beginning and at its end.
+            last = list(self._tables.items())[-1:]
+            self._tables = dict(last) | {(time, dt): collider_table(self._scene.colliders, time, dt)}
+        return self._tables[time, dt]
 
     def near(self, table: np.ndarray, before: np.ndarray, after: np.ndarray, radius: np.ndarray) -> np.ndarray:
         """May balls that go from `before` to `after` (n,3) meet a collider on their way (n,)? Errs to yes.
@@ -74,10 +86,13 @@ class Obstacles:
     def gaps(self, table: np.ndarray, before: np.ndarray, after: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """Gaps (n,colliders) [m] of points that go from `before` to `after` (n,3), negative inside, and the outward
         normals (n,colliders,3)."""
-        found = np.zeros((len(after), self.count, 4))
-        if self.count and len(after):
+        n = len(after)
+        given = [table[: self.count].ravel(), before.ravel(), after.ravel()]
+        everything = np.concatenate([*given, np.zeros(4 * n * self.count)])
+        if self.count and n:
             with runtime.precision_of("f64"):
-                _gaps(np.ascontiguousarray(table), np.stack([before, after]).astype(np.float64, copy=False), found)
+                _gaps(everything, n, self.count)
+        found = everything[len(everything) - 4 * n * self.count :].reshape(n, self.count, 4)
         return found[..., 0], found[..., 1:]
 
     def standing(

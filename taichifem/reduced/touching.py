@@ -65,21 +65,21 @@ class Touch:
         """Points that were pushed in the last step."""
         return int((self.forces[:, 0] > 0).sum())
 
-    def press(self, body, push: np.ndarray, dt: float, time: float, obstacles) -> np.ndarray:
-        """Generalised forces (r,) with those of contact, which keep the skin out of the obstacles at the step's end.
+    def press(self, body, push: np.ndarray, dt: float, time: float, obstacles):
+        """The state after dt with forces of contact, which keep the skin out of the obstacles at the end of the step.
 
         body: see `ModalBody`.  push: generalised forces (r,) without contact.
         """
         held = self.forces[:, 0] > 0
         last = self._near[self.points[held]], self.which[held], self.forces[held]
         self._clear()
-        if not obstacles.count:
-            return push
-        self._table, self._obstacles = obstacles.table(time + dt, dt), obstacles
         now, alone = body.keep(), body.trial(dt, push)
+        if not obstacles.count:
+            return alone
+        self._table, self._obstacles = obstacles.table(time + dt, dt), obstacles
         near = body.skin.near(now, alone, partial(obstacles.near, self._table))
         if not len(near):
-            return push
+            return alone
         if not np.array_equal(near, self._near) or self._close is None:
             self._near, self._close = near, body.skin.all.part(near, body.skin.all.rows.dtype)
         before = self._close.at(now)
@@ -95,7 +95,7 @@ class Touch:
             acted = self.forces if reached is not alone else np.zeros_like(self.forces)
             contact = self._forces(now, before[self.points], after, acted, compliance, dt, time)
             reached = body.trial(dt, push + contact)
-        return push + self._paid(body, push, contact, reached, alone, dt)
+        return self._paid(body, push, contact, reached, alone, dt)
 
     def _begin_with(self, points: np.ndarray, which: np.ndarray, forces: np.ndarray, before, alone) -> np.ndarray:
         """Contacts of the last step, by their numbers among all points, are the first to be looked at in this one:
@@ -150,16 +150,17 @@ class Touch:
             )
         return J.T @ self.forces.ravel()
 
-    def _paid(self, body, push, contact, reached, alone, dt) -> np.ndarray:
-        """The contact forces, or a part of them that takes no more energy than contact has dissipated."""
+    def _paid(self, body, push, contact, reached, alone, dt):
+        """The state with the contact forces, or with a part that takes no more energy than contact has dissipated."""
         for share in (1.0, 0.95, 0.85, 0.7, 0.5, 0.25, 0.0):
-            part = share * contact
-            work = body.work(part, reached if share == 1 else body.trial(dt, push + part), alone)
+            if share < 1:
+                reached = body.trial(dt, push + share * contact)
+            work = body.work(share * contact, reached, alone)
             if work <= self.dissipated:
                 break
         self.dissipated -= work
         self.forces = share * self.forces
-        return part
+        return reached
 
     def stop(self, body, dt: float) -> None:
         """At the end of the step, stop what the obstacles pushed: a step that just closes a gap would fling it back."""
