@@ -121,8 +121,8 @@ def frame_of(w: ti.template(), e: ti.i32, F, most: ti.i32, keep: ti.i32):
 
 
 def _tolerance(precision: str) -> float:
-    """Turn [rad] below which a rotation counts as found: Newton's next error is about its square."""
-    return {"f32": 2e-4, "f64": 1e-8}[precision]
+    """Error [rad] with which a rotation counts as found."""
+    return {"f32": 1e-5, "f64": 1e-13}[precision]
 
 
 @ti.func

@@ -35,14 +35,20 @@ def nearest_rotation(F, start, tolerance, most: ti.i32):
 
     Newton's method on the rotation group, started from the quaternion `start` (the rotation of the last step:
     one or two iterations then suffice). With S = R^T F, the gradient is the axial vector a of S - S^T and the
-    negative Hessian is H = tr(S) I - sym(S) (Kugelstadt, Koschier & Bender 2018). Where H is not positive
-    definite (crushed and inverted elements), the gradient itself is the direction. Along an axis n the objective
-    is (n.H n) cos t / |n|^2 + (n.a) sin t / |n| + const, so the best angle t is known exactly and every turn ascends.
-    Stops when a Newton turn is below `tolerance` [rad], or after `most` iterations.
+    negative Hessian is H = tr(S) I - sym(S) (Kugelstadt, Koschier & Bender 2018). Along an axis n the objective is
+    (n.H n) cos t / |n|^2 + (n.a) sin t / |n| + const, so the best angle t is known exactly and every turn ascends:
+    tan t = |n| along Newton's n = H^-1 a. Where H is not positive definite (crushed and inverted elements), the
+    gradient itself is the direction.
+
+    Third derivatives of the objective vanish with its gradient, so that the error after a turn by t is of third order:
+    t^3 / (3 c) at most, with c = det H / (tr H / 3)^3, which is 1 without strain, and much less where strain is small
+    (20,000 random F; 0.006 t^3 at a strain of 6 %). Stops when that is below `tolerance` [rad], or after `most` turns.
     """
     q = start
-    # The scale of F does not matter; taken out, no product below can leave the range of numbers.
-    F = F / ti.max(F.norm(), 1e-30)
+    # The scale of F does not matter: taken out where products below could leave the range of numbers.
+    scale = F.norm_sqr()
+    if scale > 1e12 or scale < 1e-12:
+        F = F / ti.max(F.norm(), 1e-30)
     left = most
     while left > 0:
         left -= 1
@@ -53,10 +59,10 @@ def nearest_rotation(F, start, tolerance, most: ti.i32):
         h01, h02, h12 = -0.5 * (S[0, 1] + S[1, 0]), -0.5 * (S[0, 2] + S[2, 0]), -0.5 * (S[1, 2] + S[2, 1])
         c00, c01, c02 = h11 * h22 - h12 * h12, h02 * h12 - h01 * h22, h01 * h12 - h02 * h11
         c11, c12, c22 = h00 * h22 - h02 * h02, h01 * h02 - h00 * h12, h00 * h11 - h01 * h01
-        n = a
         determinant = h00 * c00 + h01 * c01 + h02 * c02
-        newton = h00 > 0 and c22 > 0 and determinant > 0
-        if newton:
+        # The turn as a quaternion, whose size does not matter: (1 + cos t, sin t n / |n|), or a multiple.
+        real, n = trace, a
+        if h00 > 0 and c22 > 0 and determinant > 0:
             n = ti.Vector(
                 [
                     c00 * a[0] + c01 * a[1] + c02 * a[2],
@@ -64,23 +70,26 @@ def nearest_rotation(F, start, tolerance, most: ti.i32):
                     c02 * a[0] + c12 * a[1] + c22 * a[2],
                 ]
             )
-            n /= determinant
-        square = n.norm_sqr()
-        rise = n.dot(a)
-        bend = h00 * n[0] * n[0] + h11 * n[1] * n[1] + h22 * n[2] * n[2]
-        bend += 2 * (h01 * n[0] * n[1] + h02 * n[0] * n[2] + h12 * n[1] * n[2])
-        size = ti.sqrt(rise * rise * square + bend * bend)
-        # tan(t/2) = sin t / (1 + cos t) = (1 - cos t) / sin t, whichever does not cancel; rise is never negative.
-        real, imaginary = size + bend, rise
-        if bend < 0:
-            real, imaginary = rise * square, size - bend
-        length = ti.sqrt(real * real + imaginary * imaginary * square)
-        if length > 0:
-            real, imaginary = real / length, imaginary / length
-            turn = ti.Vector([real, imaginary * n[0], imaginary * n[1], imaginary * n[2]])
-            q = quaternion_product(q, turn).normalized()
-            if newton and 4 * imaginary * imaginary * square < tolerance * tolerance:
+            inverse, mean = 1 / determinant, 2.0 / 3.0 * trace
+            n *= inverse
+            square = n.norm_sqr()
+            real = 1 + ti.sqrt(1 + square)
+            lopsided = mean * mean * mean * inverse
+            if square * square * square * lopsided * lopsided < 9 * tolerance * tolerance:
                 left = 0
+        else:
+            square = a.norm_sqr()
+            bend = h00 * a[0] * a[0] + h11 * a[1] * a[1] + h22 * a[2] * a[2]
+            bend += 2 * (h01 * a[0] * a[1] + h02 * a[0] * a[2] + h12 * a[1] * a[2])
+            # sin t = |a|^3 / size, cos t = bend / size: of the two forms of tan(t / 2), the one that does not cancel.
+            size = ti.sqrt(square * square * square + bend * bend)
+            real = (size + bend) / ti.max(square, 1e-30)
+            if bend < 0:
+                real = square * square / ti.max(size - bend, 1e-30)
+        turned = quaternion_product(q, ti.Vector([real, n[0], n[1], n[2]]))
+        length = turned.norm()
+        if length > 0:
+            q = turned / length
         else:
             left = 0
     return q

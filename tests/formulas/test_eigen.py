@@ -80,7 +80,7 @@ def test_signed_svd(precision):
         V: ti.types.ndarray(dtype=matrix, ndim=1),
     ):
         for i in source:
-            q = rotation.nearest_rotation(source[i], ti.Vector([1.0, 0.0, 0.0, 0.0]), 1e-8, 60)
+            q = rotation.nearest_rotation(source[i], ti.Vector([1.0, 0.0, 0.0, 0.0]), 1e-13, 60)
             U[i], s[i], V[i] = eigen.signed_svd(source[i], rotation.rotation_of(q))
 
     with runtime.precision_of(precision):

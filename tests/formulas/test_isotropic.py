@@ -24,7 +24,7 @@ def make_kernels(precision: str):
     @ti.kernel
     def decompose(F: matrix, U: matrix, s: vector, V: matrix):
         for n in F:
-            turn = rotation.nearest_rotation(F[n], ti.Vector([1.0, 0.0, 0.0, 0.0]), 1e-8, 60)
+            turn = rotation.nearest_rotation(F[n], ti.Vector([1.0, 0.0, 0.0, 0.0]), 1e-13, 60)
             U[n], s[n], V[n] = eigen.signed_svd(F[n], rotation.rotation_of(turn))
 
     @ti.kernel

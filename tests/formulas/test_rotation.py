@@ -35,7 +35,7 @@ def test_nearest_rotation_from_a_cold_start(precision, error):
     runtime.start()
     real = runtime.PRECISIONS[precision]
     F = gradients()
-    tolerance = 2e-4 if precision == "f32" else 1e-8
+    tolerance = 1e-5 if precision == "f32" else 1e-13
     source, result = ti.Matrix.field(3, 3, real, len(F)), ti.Matrix.field(3, 3, real, len(F))
     source.from_numpy(F.astype(np.float32 if precision == "f32" else np.float64))
 
@@ -55,6 +55,36 @@ def test_nearest_rotation_from_a_cold_start(precision, error):
         gap = s[1] + s[2] * np.sign(np.linalg.det(F[k]))
         assert gap > 0
         np.testing.assert_allclose(R, by_svd(F[k]), atol=error * max(1, s[0] / gap))
+
+
+def test_a_turn_from_nearby_leaves_an_error_of_third_order():
+    """What the search goes by to stop: at most t^3 / (3 c) after a turn by t, with c = det H / (tr H / 3)^3."""
+    rng = np.random.default_rng(8)
+    F = np.array([f for f in gradients() if np.linalg.det(f) > 0])
+    exact = np.array([by_svd(f) for f in F])
+    angle, axis = 10 ** rng.uniform(-2.5, -1, size=len(F)), rng.normal(size=(len(F), 3))
+    away = axis / np.linalg.norm(axis, axis=1)[:, None] * np.sin(angle / 2)[:, None]
+    runtime.start()
+    source, result = ti.Matrix.field(3, 3, ti.f64, len(F)), ti.Matrix.field(3, 3, ti.f64, len(F))
+    start = ti.Vector.field(4, ti.f64, len(F))
+    # In the axes of the nearest rotation it is the identity.
+    source.from_numpy(exact.transpose(0, 2, 1) @ F)
+    start.from_numpy(np.column_stack([np.cos(angle / 2), away]))
+
+    @ti.kernel
+    def run():
+        for i in source:
+            result[i] = rotation.rotation_of(rotation.nearest_rotation(source[i], start[i], 0.0, 1))
+
+    with runtime.precision_of("f64"):
+        run()
+    left = result.to_numpy()
+    error = np.linalg.norm(left - np.eye(3), axis=(1, 2)) / np.sqrt(2)
+    stretch = exact.transpose(0, 2, 1) @ F
+    H = np.trace(stretch, axis1=1, axis2=2)[:, None, None] * np.eye(3) - stretch
+    c = np.linalg.det(H) / (np.trace(H, axis1=1, axis2=2) / 3) ** 3
+    assert (error <= 0.36 * angle**3 / c + 1e-14).all()
+    assert (error < 0.05 * angle).mean() > 0.9
 
 
 QUICK_CASES = {
