@@ -198,10 +198,14 @@ def deform(
         gradients = w.gradients[e]
         F = edges(w.x, w, e) @ gradients
         R = frame_of(w, e, F, most, keep)
-        rate = symmetric(R.transpose() @ (edges(w.v, w, e) @ gradients))
         damping = row[STIFFNESS_DAMPING]
         share = ti.cast(rate_factor, w.real) + ti.cast(rate_damping, w.real) * damping
-        strain = elastic_strain(F, R, w, e, row, due, keep) + share * lifted_matrix(rate, w)
+        change = share * (edges(w.v, w, e) @ gradients)
+        strain = ti.Matrix.zero(w.real, 3, 3)
+        if ti.static(w.capacity.plastic):
+            strain = elastic_strain(F, R, w, e, row, due, keep) + lifted_matrix(symmetric(R.transpose() @ change), w)
+        else:
+            strain = elastic_strain(F + change, R, w, e, row, due, keep)
         stress = R @ seen_matrix(hooke.stress(strain, row[LAMBDA], row[MU]), w)
         volume = w.volume[e]
         hand_out(with_first(gradients @ R.transpose()), w.h, w, e)
