@@ -218,10 +218,15 @@ class World:
         self.child_begin, self.child_end = self._scalar(groups, ti.i32), self._scalar(groups, ti.i32)
         self.level_first = self._scalar(MOST_LEVELS + 1, ti.i32)
         self.centre, self.reach = self._vector(groups, 3), self._scalar(groups)
+        # From the centre of its aggregate to a node, and behind those to an aggregate, in units of the reach there.
+        self.arm = self._vector(n + groups, 3)
         self.coarse_pair = self._vector(self.capacity.coarse_pairs, 4, ti.i32)
         self.member_start = self._scalar(self.capacity.coarse_pairs + 1, ti.i32)
         self.member = self._vector(self.capacity.members, 2, ti.i32)
-        # Where each aggregate's own blocks are, and their inverse: four blocks, shift and turn by shift and turn.
+        # Of each aggregate's own matrix, the blocks for shifts, for shift by turn and for turns: without springs, and
+        # what springs add (`linear_algebra.coarse_springs`).
+        self.bare, self.sprung_on = self._matrix(3 * groups, 3, 3), self._matrix(3 * groups, 3, 3)
+        # Where these blocks are, and their inverse: four blocks, shift and turn by shift and turn.
         self.own_block, self.own_inverse = self._scalar(groups, ti.i32), self._matrix(4 * groups, 3, 3)
         # Inverse of the last level's matrix, and the diagonal that the matrix had.
         self.last_inverse, self.pivot = self._scalar(DENSE * DENSE, ti.f64), self._scalar(DENSE, ti.f64)

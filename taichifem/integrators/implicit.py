@@ -99,7 +99,6 @@ def _update(w: ti.template(), n: ti.i32, h: ti.f64):
 def _shorten(w: ti.template(), n: ti.i32, h: ti.f64, back: ti.f64):
     """Take back the part `back` of the last correction."""
     ti.loop_config(serialize=ti.static(w.alone(10)))
-    ti.loop_config(serialize=ti.static(w.alone(10)))
     for i in range(n):
         w.v[i] -= ti.cast(back, w.real) * w.direction[i]
         w.x[i] = w.base_x[i] + ti.cast(h, w.real) * w.v[i]
@@ -151,6 +150,8 @@ def solve(step: Step, *, h: float, newton: int, inertia: bool = True) -> StepRep
                 weight=weight,
                 drag_factor=h * inertia,
                 guessed=inertia and passes == 1 and report.linearisations == 0,
+                # Springs of vertices that ride in tetrahedra stand between nodes as well.
+                springs_only=passes > 1 and not counts.riding,
             )
 
     def solve_step() -> pcg.Convergence:

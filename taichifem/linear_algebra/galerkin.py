@@ -4,6 +4,8 @@ Z are the rigid motions of aggregates (see `multilevel`). Every block is gathere
 """
 
 from taichifem import elements
+from taichifem.linear_algebra.coarse_springs import lean
+from taichifem.linear_algebra.rigid_motions import arm, crossed
 from taichifem.runtime import ti
 from taichifem.structure.aggregates import Aggregates
 from taichifem.structure.levels import Levels
@@ -53,22 +55,8 @@ def stay(w: ti.template(), n: ti.i32):
 
 
 @ti.func
-def arm(w: ti.template(), n: ti.i32, level: ti.i32, item: ti.i32):
-    """From the centre of its aggregate to a node (level 0) or an aggregate, in units of the reach there."""
-    where = ti.Vector.zero(w.real, 3)
-    g = 0
-    if level == 0:
-        g = w.parent[item]
-        where = w.relaxed[item]
-    else:
-        g = w.parent[n + item]
-        where = w.centre[item]
-    return (where - w.centre[g]) / w.reach[g]
-
-
-@ti.func
-def _place(w: ti.template(), position: ti.template(), of_nodes: ti.template(), g: ti.i32):
-    """Centre and reach (root mean square of the arms) of an aggregate of nodes or aggregates."""
+def _place(w: ti.template(), n: ti.i32, position: ti.template(), of_nodes: ti.template(), g: ti.i32):
+    """Centre and reach (root mean square of the arms) of an aggregate of nodes or aggregates, and their arms."""
     begin, end = w.child_begin[g], w.child_end[g]
     centre, square = ti.Vector.zero(w.real, 3), ti.cast(0.0, w.real)
     for k in range(begin, end):
@@ -81,20 +69,19 @@ def _place(w: ti.template(), position: ti.template(), of_nodes: ti.template(), g
     w.centre[g] = centre
     reach = ti.sqrt(square / ti.cast(end - begin, w.real))
     # A single node has arms of round-off: they must not be made large.
-    w.reach[g] = reach if reach > ti.cast(1e-5, w.real) * centre.norm() else ti.cast(1.0, w.real)
-
-
-@ti.func
-def _crossed(M, r):
-    """The matrix whose column b is M (e_b x r): its rows are r x (rows of M)."""
-    return ti.Matrix.rows([r.cross(ti.Vector([M[a, 0], M[a, 1], M[a, 2]])) for a in ti.static(range(3))])
+    if reach <= ti.cast(1e-5, w.real) * centre.norm():
+        reach = ti.cast(1.0, w.real)
+    w.reach[g] = reach
+    first = 0 if ti.static(of_nodes) else n
+    for k in range(begin, end):
+        w.arm[first + k] = (position[k] - centre) / reach
 
 
 @ti.func
 def _store(w: ti.template(), n: ti.i32, q: ti.i32, shift, right, turned, both):
     """The four blocks of pair q, and those of its mirror image.
 
-    Of an aggregate with itself, one half has been gathered: the other is its mirror image.
+    Of an aggregate with itself, one half has been gathered: the other is its mirror image. Springs are still missing.
     """
     g, o, at, mirror = w.coarse_pair[q][0], w.coarse_pair[q][1], w.coarse_pair[q][2], w.coarse_pair[q][3]
     if g == o:
@@ -102,6 +89,7 @@ def _store(w: ti.template(), n: ti.i32, q: ti.i32, shift, right, turned, both):
         both += both.transpose()
         right += turned.transpose()
         turned = right.transpose()
+        w.bare[3 * g], w.bare[3 * g + 1], w.bare[3 * g + 2] = shift, right, both
     width = w.row_start[n + 2 * g + 1] - w.row_start[n + 2 * g]
     w.block[at], w.block[at + 1] = shift, right
     w.block[at + width], w.block[at + width + 1] = turned, both
@@ -116,7 +104,7 @@ def _gather_nodes(w: ti.template(), n: ti.i32, aggregates: ti.i32, pairs: ti.i32
     """Level 1, from the matrix of the nodes."""
     ti.loop_config(serialize=ti.static(w.alone(10)))
     for g in range(aggregates):
-        _place(w, w.relaxed, True, g)
+        _place(w, n, w.relaxed, True, g)
     for q in range(pairs):
         shift, right = ti.Matrix.zero(w.real, 3, 3), ti.Matrix.zero(w.real, 3, 3)
         turned, both = ti.Matrix.zero(w.real, 3, 3), ti.Matrix.zero(w.real, 3, 3)
@@ -124,14 +112,17 @@ def _gather_nodes(w: ti.template(), n: ti.i32, aggregates: ti.i32, pairs: ti.i32
             i, k = w.member[m][0], w.member[m][1]
             j = w.column[k]
             # Of the diagonal, a half: see `_store`.
-            block = w.block[k] * w.free[i].outer_product(w.free[j]) * (0.5 if i == j else 1.0)
+            block = w.block[k]
+            if i == j:
+                block = 0.5 * w.own[i]
+            block *= w.free[i].outer_product(w.free[j])
             # Columns of the turns: A (e_b x arm); rows in the same way.
-            block_right = _crossed(block, arm(w, n, 0, j))
+            block_right = crossed(block, arm(w, n, 0, j))
             arm_i = arm(w, n, 0, i)
             shift += block
             right += block_right
-            turned += _crossed(block.transpose(), arm_i).transpose()
-            both += _crossed(block_right.transpose(), arm_i).transpose()
+            turned += crossed(block.transpose(), arm_i).transpose()
+            both += crossed(block_right.transpose(), arm_i).transpose()
         _store(w, n, q, shift, right, turned, both)
 
 
@@ -140,7 +131,7 @@ def _gather_level(w: ti.template(), n: ti.i32, level: ti.i32, first: ti.i32, end
     """A level from that below: aggregates `first` to `end`, pairs `begin` to `last`."""
     ti.loop_config(serialize=ti.static(w.alone(2)))
     for g in range(first, end):
-        _place(w, w.centre, False, g)
+        _place(w, n, w.centre, False, g)
     ti.loop_config(serialize=ti.static(w.alone(20)))
     for q in range(begin, last):
         shift, right = ti.Matrix.zero(w.real, 3, 3), ti.Matrix.zero(w.real, 3, 3)
@@ -154,12 +145,12 @@ def _gather_level(w: ti.template(), n: ti.i32, level: ti.i32, first: ti.i32, end
             arm_j, share_j = arm(w, n, level - 1, j), w.reach[j] / w.reach[w.parent[n + j]]
             part = 0.5 if i == j else 1.0
             block, mixed = part * w.block[k], part * w.block[k + width]
-            block_right = _crossed(block, arm_j) + part * share_j * w.block[k + 1]
-            mixed_right = _crossed(mixed, arm_j) + part * share_j * w.block[k + width + 1]
+            block_right = crossed(block, arm_j) + part * share_j * w.block[k + 1]
+            mixed_right = crossed(mixed, arm_j) + part * share_j * w.block[k + width + 1]
             shift += block
             right += block_right
-            turned += _crossed(block.transpose(), arm_i).transpose() + share_i * mixed
-            both += _crossed(block_right.transpose(), arm_i).transpose() + share_i * mixed_right
+            turned += crossed(block.transpose(), arm_i).transpose() + share_i * mixed
+            both += crossed(block_right.transpose(), arm_i).transpose() + share_i * mixed_right
         _store(w, n, q, shift, right, turned, both)
 
 
@@ -250,10 +241,15 @@ class Galerkin:
         last = self._first[-1] - self._first[-2]
         self._whole = last if 6 * last <= DENSE else 0
 
-    def renew(self, w: World) -> None:
-        """All coarse matrices and inverses, from `w.block` of the nodes at `w.relaxed`."""
+    def renew(self, w: World, *, springs_only: bool = False) -> None:
+        """All coarse matrices and inverses, from `w.block` and `w.spring` of the nodes at `w.relaxed`.
+
+        springs_only: nothing but the springs on single nodes has changed since the last time.
+        """
         n, first, pair = self._n, self._first, self._pair
-        _gather_nodes(w, n, first[1], pair[1])
-        for level in range(2, len(first)):
-            _gather_level(w, n, level, first[level - 1], first[level], pair[level - 1], pair[level])
+        if not springs_only:
+            _gather_nodes(w, n, first[1], pair[1])
+            for level in range(2, len(first)):
+                _gather_level(w, n, level, first[level - 1], first[level], pair[level - 1], pair[level])
+        lean(w, n, first[1], self._count)
         _invert(w, n, self._count, self._whole)

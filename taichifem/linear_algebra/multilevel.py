@@ -4,11 +4,10 @@ A smoother deals with errors that change from node to node; what it leaves, larg
 rigidly against each other, lies near the span Z of the aggregates' six rigid motions (Bulgakov 1993). The Galerkin
 matrix Z^T A Z is again a block matrix, so the same is done to it, until what is left can be inverted.
 
-Unknowns of an aggregate are the shift of its centre, and its turn times its `reach`, so that both are of one size.
 Each function does one operation for one row, node or aggregate; `program` tells in which order they come.
 """
 
-from taichifem.linear_algebra.galerkin import arm
+from taichifem.linear_algebra.rigid_motions import arm
 from taichifem.runtime import ti
 
 WEIGHT = 0.49

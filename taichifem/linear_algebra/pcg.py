@@ -58,6 +58,7 @@ def solve(
     weight: float,
     drag_factor: float,
     guessed: bool = False,
+    springs_only: bool = False,
 ) -> Convergence:
     """Improve `w.dv` until the residual is below `tolerance` times what acts on the nodes.
 
@@ -66,6 +67,7 @@ def solve(
     noise: relative rounding error of the forces, over dt.  weight: gravity times dt [m/s].
     drag_factor: of `w.drag` in the matrix.
     guessed: start from what the last steps did (`guess`), not from `w.dv`.
+    springs_only: of the matrix, nothing but `w.spring` has changed since the last solve.
     Raises Diverged where the residual is not finite.
     """
     n, flying = counts.nodes, counts.bodies if counts.flying else 0
@@ -78,7 +80,7 @@ def solve(
         balance.translate(w, flying, drag_factor)
     galerkin, program = plan.galerkin, plan.program
     if galerkin is not None:
-        galerkin.renew(w)
+        galerkin.renew(w, springs_only=springs_only)
     limits = Limits(tolerance, max_iterations)
     spent = 0
     if galerkin is not None and not _iterate(w, n, program, limits, plain=False):
