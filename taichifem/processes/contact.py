@@ -23,14 +23,16 @@ NONE, STICKS, SLIPS = 0, 1, 2
 def gap(w: ti.template(), c: ti.i32, start, end):
     """How far [m] a point that moves from `start` to `end` ends outside of collider c, and the outward normal."""
     R = w.collider_rotation[c]
-    p0 = w.collider_rotation0[c].transpose() @ (start - w.collider_center0[c])
     p1 = R.transpose() @ (end - w.collider_center[c])
     gap, normal = collision.gap_to_half_space(p1)
-    if w.collider_kind[c] == collision.SPHERE:
-        gap, normal = collision.gap_to_sphere(p0, p1, w.collider_size[c][0])
-    elif w.collider_kind[c] == collision.BOX:
-        gap, normal = collision.gap_to_box(p0, p1, 0.5 * w.collider_size[c])
-    outward = R @ normal
+    outward = ti.Vector([R[0, 2], R[1, 2], R[2, 2]])
+    if w.collider_kind[c] != collision.PLANE:
+        p0 = w.collider_rotation0[c].transpose() @ (start - w.collider_center0[c])
+        if w.collider_kind[c] == collision.SPHERE:
+            gap, normal = collision.gap_to_sphere(p0, p1, w.collider_size[c][0])
+        else:
+            gap, normal = collision.gap_to_box(p0, p1, 0.5 * w.collider_size[c])
+        outward = R @ normal
     if ti.static(w.d == 2):
         # A planar body meets the section of the collider: across the plane nothing pushes.
         outward[1] = 0.0
@@ -144,19 +146,20 @@ def touch(
         end = w.v[i] + w.dv[i]
         for c in range(n_colliders):
             state, force, normal, stretch = _state(w, c, i, step, whole, end)
-            k, was, pressed = stiffness(w, i, step), w.touching[c, i], w.pressed[c, i]
-            springs, side = ti.Matrix.zero(w.real, 3, 3), ti.cast(0.0, w.real)
-            if state != NONE:
-                springs, side = springs_of(w, c, state, normal, stretch, k, pressed)
-            wrong = wrong_by(w, c, was, state, force, stretch, side, w.grip[c, i], pressed)
+            was = w.touching[c, i]
             if state != NONE or was != NONE:
+                k, pressed = stiffness(w, i, step), w.pressed[c, i]
+                springs, side = ti.Matrix.zero(w.real, 3, 3), ti.cast(0.0, w.real)
+                if state != NONE:
+                    springs, side = springs_of(w, c, state, normal, stretch, k, pressed)
+                    w.sprung[i] = 1
+                    # Both forces are written for dv = 0: what `dv` adds to them stands in the matrix.
+                    push = step * (force * normal - side * stretch + step * (springs @ w.dv[i]))
+                    w.spring[i] = w.spring[i] + step * step * springs
+                    w.spring_load[i] = w.spring_load[i] + push
+                wrong = wrong_by(w, c, was, state, force, stretch, side, w.grip[c, i], pressed)
                 total += excess(w, wrong, force, w.mass[i], weight, share)
-            w.touching[c, i], w.grip[c, i] = state, side
-            if state != NONE:
-                w.sprung[i] = 1
-                w.spring[i] += step * step * springs
-                # Both forces are written for dv = 0: what `dv` adds to them stands in the matrix.
-                w.spring_load[i] += step * (force * normal - side * stretch + step * (springs @ w.dv[i]))
+                w.touching[c, i], w.grip[c, i] = state, side
     return total
 
 
