@@ -34,7 +34,7 @@ def room_for(scene: Scene, layout: Layout, laws: Laws, plan: Plan) -> Capacity:
         coarse_blocks=len(levels.column) - pattern.n_blocks,
         coarse_pairs=len(levels.pair),
         members=len(levels.member),
-        operations=len(program),
+        operations=len(program.operations),
         dimension=layout.dimension,
         tangents=laws.stores_tangents,
         springs=laws.springs,
@@ -58,7 +58,7 @@ def assert_room(capacity: Capacity, plan: Plan) -> None:
         "coarse_blocks": len(levels.column) - pattern.n_blocks,
         "coarse_pairs": len(levels.pair),
         "members": len(levels.member),
-        "operations": len(program),
+        "operations": len(program.operations),
     }
     for name, count in needed.items():
         if count > getattr(capacity, name):

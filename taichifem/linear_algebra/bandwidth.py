@@ -67,7 +67,7 @@ def measure(w: World, counts: Counts, blocks: int) -> Bandwidth:
 
     def multiply() -> None:
         w.scalar[steps.DONE] = 0
-        crew.run(w, n, np.array([[p.PRODUCT, 0, counts.pieces]]), Limits(0.0, 1), rounds=REPEATS)
+        crew.run(w, n, np.array([[p.PRODUCT, 0, counts.pieces]]), Limits(0.0, 1), repeated=(0, 1), rounds=REPEATS)
 
     product = _best(multiply) / REPEATS
     w.operation[0] = before

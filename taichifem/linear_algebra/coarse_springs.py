@@ -23,34 +23,21 @@ def _add(w: ti.template(), g: ti.i32, shift, right, both, across, share):
 
 
 @ti.func
-def _clear(w: ti.template(), g: ti.i32):
+def lean(w: ti.template(), n: ti.i32, level: ti.i32, g: ti.i32):
+    """The own blocks of aggregate g of a level: `w.bare`, and what springs add, which is known of the level below."""
     for k in ti.static(range(3)):
         w.sprung_on[3 * g + k] = ti.Matrix.zero(w.real, 3, 3)
-
-
-@ti.kernel
-def lean(w: ti.template(), n: ti.i32, first: ti.i32, count: ti.i32):
-    """The own blocks of all `count` aggregates from `w.bare` and `w.spring`; the first level has `first` of them."""
-    ti.loop_config(serialize=ti.static(w.alone(10)))
-    for g in range(first):
-        _clear(w, g)
-        nothing = ti.Matrix.zero(w.real, 3, 3)
-        for i in range(w.child_begin[g], w.child_end[g]):
-            if w.spring[i].trace() > 0:
-                spring = w.spring[i] * w.free[i].outer_product(w.free[i])
-                _add(w, g, spring, nothing, nothing, arm(w, n, 0, i), ti.cast(0.0, w.real))
-    ti.loop_config(serialize=True)
-    for g in range(first, count):
-        _clear(w, g)
-        for c in range(w.child_begin[g], w.child_end[g]):
-            if w.sprung_on[3 * c].trace() > 0:
-                shift, right, both = w.sprung_on[3 * c], w.sprung_on[3 * c + 1], w.sprung_on[3 * c + 2]
-                _add(w, g, shift, right, both, arm(w, n, 1, c), w.reach[c] / w.reach[g])
-    ti.loop_config(serialize=True)
-    for g in range(count):
-        k, width = w.own_block[g], w.row_start[n + 2 * g + 1] - w.row_start[n + 2 * g]
-        right = w.bare[3 * g + 1] + w.sprung_on[3 * g + 1]
-        w.block[k] = w.bare[3 * g] + w.sprung_on[3 * g]
-        w.block[k + 1] = right
-        w.block[k + width] = right.transpose()
-        w.block[k + width + 1] = w.bare[3 * g + 2] + w.sprung_on[3 * g + 2]
+    for item in range(w.child_begin[g], w.child_end[g]):
+        if level == 1:
+            if w.spring[item].trace() > 0:
+                spring, nothing = w.spring[item] * w.free[item].outer_product(w.free[item]), 0 * w.spring[item]
+                _add(w, g, spring, nothing, nothing, arm(w, n, 0, item), ti.cast(0.0, w.real))
+        elif w.sprung_on[3 * item].trace() > 0:
+            shift, right, both = w.sprung_on[3 * item], w.sprung_on[3 * item + 1], w.sprung_on[3 * item + 2]
+            _add(w, g, shift, right, both, arm(w, n, level - 1, item), w.reach[item] / w.reach[g])
+    k, width = w.own_block[g], w.row_start[n + 2 * g + 1] - w.row_start[n + 2 * g]
+    right = w.bare[3 * g + 1] + w.sprung_on[3 * g + 1]
+    w.block[k] = w.bare[3 * g] + w.sprung_on[3 * g]
+    w.block[k + 1] = right
+    w.block[k + width] = right.transpose()
+    w.block[k + width + 1] = w.bare[3 * g + 2] + w.sprung_on[3 * g + 2]

@@ -12,7 +12,7 @@ operation is a launch of its own, with the same code.
 import numpy as np
 
 from taichifem import runtime
-from taichifem.linear_algebra import multilevel, steps
+from taichifem.linear_algebra import coarse_inverses, coarse_springs, multilevel, steps
 from taichifem.linear_algebra import program as p
 from taichifem.linear_algebra.matrix import multiply
 from taichifem.linear_algebra.steps import Limits
@@ -21,7 +21,7 @@ from taichifem.world import DENSE, SIDES, World
 
 
 @ti.func
-def _perform(w: ti.template(), n: ti.i32, kind: ti.i32, level: ti.i32, c: ti.i32, pieces: ti.i32):
+def _perform(w: ti.template(), n: ti.i32, kind: ti.i32, level: ti.i32, c: ti.i32, pieces: ti.i32, noise: ti.f64):
     """Piece c of an operation, and its share of the sums that some need."""
     first, items = 0, n
     if level > 0:
@@ -65,11 +65,26 @@ def _perform(w: ti.template(), n: ti.i32, kind: ti.i32, level: ti.i32, c: ti.i32
             q = w.free[i] * w.product[i]
             w.product[i] = q
             sums[0] += ti.cast(w.direction[i].dot(q), ti.f64)
+    elif kind == p.PREPARE:
+        for i in range(begin, end):
+            sums += steps.prepare(w, i, noise)
+    elif kind == p.BEGIN:
+        multiply(w, w.dv, w.product, begin, end)
+        for i in range(begin, end):
+            steps.leave(w, i, w.product[i])
+    elif kind == p.LEAN:
+        for g in range(begin, end):
+            coarse_springs.lean(w, n, level, g)
+            coarse_inverses.invert_own(w, n, g)
+    elif kind == p.WHOLE:
+        coarse_inverses.invert_whole(w, n, first, first + items)
     w.partial[c] = sums
 
 
 @ti.func
-def _conclude(w: ti.template(), kind: ti.i32, level: ti.i32, pieces: ti.i32, tolerance: ti.f64, most: ti.i32):
+def _conclude(
+    w: ti.template(), kind: ti.i32, level: ti.i32, pieces: ti.i32, tolerance: ti.f64, most: ti.i32, weight: ti.f64
+):
     """What follows from the sums once all pieces of an operation are done."""
     if kind == p.ADVANCE:
         steps.after_advance(w, pieces, tolerance, most)
@@ -77,6 +92,8 @@ def _conclude(w: ti.template(), kind: ti.i32, level: ti.i32, pieces: ti.i32, tol
         steps.after_cycle(w, pieces)
     elif kind == p.PRODUCT:
         steps.after_product(w, pieces)
+    elif kind == p.PREPARE:
+        steps.after_prepare(w, pieces, weight)
 
 
 @ti.kernel
@@ -84,57 +101,93 @@ def _run_together(
     w: ti.template(),
     workers: ti.i32,
     n: ti.i32,
+    first: ti.i32,
+    opening: ti.i32,
     begin: ti.i32,
     operations: ti.i32,
     rounds: ti.i32,
     tolerance: ti.f64,
     most: ti.i32,
+    noise: ti.f64,
+    weight: ti.f64,
 ):
     ti.loop_config(serialize=True)
-    for turn in range(operations * rounds):
+    for turn in range(opening + operations * rounds):
         for side in ti.static(range(SIDES)):
             w.claimed[turn, side] = 0
         w.finished[turn] = 0
+        if turn < opening:
+            w.scalar[steps.DONE] = 0.0
     ti.loop_config(block_dim=1)
     for me in range(workers):
         sides = ti.min(workers, SIDES)
-        for turn in range(operations * rounds):
+        for turn in range(opening + operations * rounds):
             if w.scalar[steps.DONE] == 0:
-                operation = w.operation[begin + turn % operations]
-                kind, level, pieces = operation[0], operation[1], operation[2]
+                at = first + turn
+                if turn >= opening:
+                    at = begin + (turn - opening) % operations
+                kind, level, pieces = w.operation[at][0], w.operation[at][1], w.operation[at][2]
                 for k in range(sides):
                     side = (me + k) % sides
-                    first, last = steps.range_of(pieces, side, sides)
-                    c = first + ti.atomic_add(w.claimed[turn, side], 1)
+                    start, last = steps.range_of(pieces, side, sides)
+                    c = start + ti.atomic_add(w.claimed[turn, side], 1)
                     while c < last:
-                        _perform(w, n, kind, level, c, pieces)
+                        _perform(w, n, kind, level, c, pieces, noise)
                         if ti.atomic_add(w.finished[turn], 1) == pieces - 1:
-                            _conclude(w, kind, level, pieces, tolerance, most)
+                            _conclude(w, kind, level, pieces, tolerance, most, weight)
                             ti.atomic_add(w.finished[turn], 1)
-                        c = first + ti.atomic_add(w.claimed[turn, side], 1)
+                        c = start + ti.atomic_add(w.claimed[turn, side], 1)
                 while ti.atomic_or(w.finished[turn], 0) <= pieces:
                     pass
 
 
 @ti.kernel
-def _run_one(w: ti.template(), n: ti.i32, kind: ti.i32, level: ti.i32, pieces: ti.i32, tolerance: ti.f64, most: ti.i32):
+def _run_one(
+    w: ti.template(),
+    n: ti.i32,
+    kind: ti.i32,
+    level: ti.i32,
+    pieces: ti.i32,
+    tolerance: ti.f64,
+    most: ti.i32,
+    noise: ti.f64,
+    weight: ti.f64,
+    opens: ti.i32,
+):
+    ti.loop_config(serialize=True)
+    for _ in range(opens):
+        w.scalar[steps.DONE] = 0.0
     for c in range(pieces):
         if w.scalar[steps.DONE] == 0:
-            _perform(w, n, kind, level, c, pieces)
+            _perform(w, n, kind, level, c, pieces, noise)
     ti.loop_config(serialize=True)
     for _ in range(1):
         if w.scalar[steps.DONE] == 0:
-            _conclude(w, kind, level, pieces, tolerance, most)
+            _conclude(w, kind, level, pieces, tolerance, most, weight)
 
 
-def run(w: World, n: int, operations: np.ndarray, limits: Limits, *, rounds: int, begin: int = 0) -> None:
-    """Repeat some operations (k,3), which stand in the world from `begin` on, until the solve is done.
+def run(
+    w: World,
+    n: int,
+    operations: np.ndarray,
+    limits: Limits,
+    *,
+    opening: tuple[int, int] = (0, 0),
+    repeated: tuple[int, int] = (0, 0),
+    rounds: int = 0,
+) -> None:
+    """Do a range of the operations (k,3) that the world has, and repeat another until the solve is done.
 
     rounds: times at most.
     """
+    (first, end), (begin, last) = opening, repeated
+    judged = limits.tolerance, limits.most, limits.noise, limits.weight
     if runtime.running_arch() == "cpu":
-        _run_together(w, runtime.threads(), n, begin, len(operations), rounds, limits.tolerance, limits.most)
+        _run_together(w, runtime.threads(), n, first, end - first, begin, last - begin, rounds, *judged)
         return
+    listed = operations.tolist()
+    for k in range(first, end):
+        _run_one(w, n, *listed[k], *judged, 1)
     for _ in range(rounds):
-        for kind, level, pieces in operations.tolist():
-            _run_one(w, n, kind, level, pieces, limits.tolerance, limits.most)
+        for k in range(begin, last):
+            _run_one(w, n, *listed[k], *judged, 0)

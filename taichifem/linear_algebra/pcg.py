@@ -11,15 +11,13 @@ Scalars stay on the device in double precision; sums add fixed pieces in order, 
 """
 
 import math
-from dataclasses import dataclass
-
-import numpy as np
+from dataclasses import dataclass, replace
 
 from taichifem.errors import Diverged
-from taichifem.linear_algebra import balance, crew, steps
+from taichifem.linear_algebra import balance, crew
 from taichifem.linear_algebra.guess import guess
 from taichifem.linear_algebra.plan import Plan
-from taichifem.linear_algebra.program import PLAIN_ROUND
+from taichifem.linear_algebra.program import READY, Program
 from taichifem.linear_algebra.steps import COUNT, DONE, INDEFINITE, NOISE, RESIDUAL, RZ, SIZE, Limits
 from taichifem.world import MOST_TURNS, Counts, World
 
@@ -71,25 +69,25 @@ def solve(
     Raises Diverged where the residual is not finite.
     """
     n, flying = counts.nodes, counts.bodies if counts.flying else 0
-    steps.prepare(w, n, counts.pieces, noise, weight)
-    if guessed:
-        guess(w, n, counts.pieces)
-    else:
-        steps.begin(w, n, counts.pieces)
-    if flying:
-        balance.translate(w, flying, drag_factor)
     galerkin, program = plan.galerkin, plan.program
-    if galerkin is not None:
-        galerkin.renew(w, springs_only=springs_only)
-    limits = Limits(tolerance, max_iterations)
+    limits = Limits(tolerance, max_iterations, noise, weight)
+    if galerkin is not None and not springs_only:
+        galerkin.renew(w)
+    ready = 0
+    if guessed or flying:
+        # This goes between the operations.
+        crew.run(w, n, program.operations, limits, opening=(0, 1 if guessed else READY))
+        ready = READY
+        if guessed:
+            guess(w, n, counts.pieces)
+        if flying:
+            balance.translate(w, flying, drag_factor)
     spent = 0
-    if galerkin is not None and not _iterate(w, n, program, limits, plain=False):
-        spent = int(w.scalar[COUNT])
-        steps.prepare(w, n, counts.pieces, noise, weight)
-        steps.begin(w, n, counts.pieces)
-        limits = Limits(tolerance, max(max_iterations - spent, 1))
+    if galerkin is not None and not _iterate(w, n, program, limits, ready, plain=False):
+        spent, ready = int(w.scalar[COUNT]), 0
+        limits = replace(limits, most=max(max_iterations - spent, 1))
     if galerkin is None or spent:
-        _iterate(w, n, program, limits, plain=True)
+        _iterate(w, n, program, limits, ready, plain=True)
     if flying:
         balance.translate(w, flying, drag_factor)
         balance.spin(w, n, counts.pieces, flying, drag_factor)
@@ -106,16 +104,18 @@ def solve(
     )
 
 
-def _iterate(w: World, n: int, program: np.ndarray, limits: Limits, *, plain: bool) -> bool:
-    """Go on until the solve is done. False if the levels do not help: then it can be done without.
+def _iterate(w: World, n: int, program: Program, limits: Limits, ready: int, *, plain: bool) -> bool:
+    """Make ready, but for the first `ready` operations, and go on until the solve is done.
 
-    Splinters may be so stiff and light that single precision leaves nothing of the matrices of their rigid motions.
+    False if the levels do not help: then it can be done without. Splinters may be so stiff and light that single
+    precision leaves nothing of the matrices of their rigid motions.
     """
-    levelled = len(program) - PLAIN_ROUND
-    begin, end = (levelled, len(program)) if plain else (0, levelled)
-    rounds, idle, best = min(ROUNDS, MOST_TURNS // (end - begin)), 0, math.inf
+    begin, end = (program.plain, len(program.operations)) if plain else (program.cycle, program.plain)
+    opening = (ready, READY if plain else program.cycle)
+    rounds, idle, best = min(ROUNDS, (MOST_TURNS - opening[1]) // (end - begin)), 0, math.inf
     while True:
-        crew.run(w, n, program[begin:end], limits, rounds=rounds, begin=begin)
+        crew.run(w, n, program.operations, limits, opening=opening, repeated=(begin, end), rounds=rounds)
+        opening = (0, 0)
         residual = w.scalar[RESIDUAL]
         if not plain and w.scalar[RZ] < 0:
             return False

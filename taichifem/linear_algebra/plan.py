@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from taichifem.linear_algebra.galerkin import Galerkin
-from taichifem.linear_algebra.program import write_program
+from taichifem.linear_algebra.program import Program, write_program
 from taichifem.structure.aggregates import Aggregates
 from taichifem.structure.levels import Levels, stack_levels
 from taichifem.structure.pattern import BlockPattern, block_pattern
@@ -15,11 +15,11 @@ from taichifem.structure.pattern import BlockPattern, block_pattern
 
 @dataclass(frozen=True)
 class Plan:
-    """The blocks of the nodes and of all levels; the operations (k,3) of a round; what makes the coarse matrices."""
+    """The blocks of the nodes and of all levels; the operations of a solve; what makes the coarse matrices."""
 
     pattern: BlockPattern
     levels: Levels
-    program: np.ndarray
+    program: Program
     galerkin: Galerkin | None
 
 

@@ -1,9 +1,11 @@
-"""A round of conjugate gradients as a list of operations: with a cycle over the levels of the preconditioner.
+"""A solve by conjugate gradients as a list of operations: rounds with a cycle over the levels of the preconditioner.
 
 As the cycle is data, not code, any number of levels and any cycle runs with the same compiled kernel.
 """
 
 from __future__ import annotations
+
+from dataclasses import dataclass
 
 import numpy as np
 
@@ -11,11 +13,8 @@ from taichifem.structure.aggregates import Aggregates
 from taichifem.structure.pattern import BlockPattern, pieces_of
 from taichifem.world import DENSE
 
-ADVANCE, LEAVE, RESTRICT, CORRECT, SMOOTH, LAST, PLAIN, DIRECT, PRODUCT = range(9)
-"""Kinds of operations; see `steps` and `multilevel`."""
-
-PLAIN_ROUND = 4
-"""Operations of a round without levels: they end every program."""
+ADVANCE, LEAVE, RESTRICT, CORRECT, SMOOTH, LAST, PLAIN, DIRECT, PRODUCT, PREPARE, BEGIN, LEAN, WHOLE = range(13)
+"""Kinds of operations; see `steps`, `multilevel` and `coarse_springs`."""
 
 FEW = 150
 """Aggregates of a level that is worth a second visit above it."""
@@ -24,16 +23,33 @@ ROWS, PARENTS = 16, 8
 """Aggregates that make a piece of work worth sharing out: their rows, or the gathering from those below."""
 
 
+@dataclass(frozen=True)
+class Program:
+    """All operations (k,3): kind, level, pieces.
+
+    First those that make ready: the matrix's diagonal, the residual at the start, from `READY` on the levels; then
+    from `cycle` on a round with levels, if there are any; from `plain` on a round without.
+    """
+
+    operations: np.ndarray
+    cycle: int
+    plain: int
+
+
+READY = 2
+"""Operations that make ready where there are no levels."""
+
+
 def most_operations(levels: int) -> int:
-    """How many operations a round has at most, with this many levels of aggregates."""
+    """How many operations a program has at most, with this many levels of aggregates."""
     most = 2
     for _ in range(levels):
         most = 2 * (3 + most) + 2
-    return most + 3 + PLAIN_ROUND
+    return READY + levels + 1 + most + 3 + 4
 
 
-def write_program(pattern: BlockPattern, aggregates: Aggregates, *, solver: str, apart: bool) -> np.ndarray:
-    """The operations (k,3) of a round: kind, level, pieces; and after them those of a round without levels.
+def write_program(pattern: BlockPattern, aggregates: Aggregates, *, solver: str, apart: bool) -> Program:
+    """The operations of a solve.
 
     solver: "multilevel" or "block-jacobi".  apart: has no aggregate of the last level a neighbour?
     """
@@ -58,5 +74,10 @@ def write_program(pattern: BlockPattern, aggregates: Aggregates, *, solver: str,
         return [*listing, leave, (SMOOTH, level, items)]
 
     first, ending = (ADVANCE, 0, fine), [(DIRECT, 0, fine), (PRODUCT, 0, fine)]
-    rounds = [first, *visit(0), *ending] if solver == "multilevel" else []
-    return np.array([*rounds, first, (PLAIN, 0, fine), *ending], dtype=np.int32)
+    ready, cycle = [(PREPARE, 0, fine), (BEGIN, 0, fine)], []
+    if solver == "multilevel":
+        ready += [(LEAN, level, pieces_of(counts[level], PARENTS)) for level in range(1, last + 1)]
+        ready += [(WHOLE, last, 1)] if 6 * counts[last] <= DENSE else []
+        cycle = [first, *visit(0), *ending]
+    operations = np.array([*ready, *cycle, first, (PLAIN, 0, fine), *ending], dtype=np.int32)
+    return Program(operations, len(ready), len(ready) + len(cycle))

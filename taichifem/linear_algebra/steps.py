@@ -2,7 +2,7 @@
 
 from dataclasses import dataclass
 
-from taichifem.linear_algebra import matrix, multilevel
+from taichifem.linear_algebra import multilevel
 from taichifem.runtime import ti
 
 RZ, RESIDUAL, DONE, COUNT, ALPHA, BETA, LOAD, NOISE, WEIGHT, SIZE, INDEFINITE = range(11)
@@ -11,10 +11,12 @@ RZ, RESIDUAL, DONE, COUNT, ALPHA, BETA, LOAD, NOISE, WEIGHT, SIZE, INDEFINITE = 
 
 @dataclass(frozen=True)
 class Limits:
-    """When a solve ends: relative residual, and iterations at most."""
+    """When a solve ends: relative residual, and iterations at most; `noise` and `weight` are those of `pcg.solve`."""
 
     tolerance: float
     most: int
+    noise: float = 0.0
+    weight: float = 0.0
 
 
 @ti.func
@@ -58,38 +60,33 @@ def range_of(items: ti.i32, c: ti.i32, pieces: ti.i32):
     return first, first + size + ti.cast(c < more, ti.i32)
 
 
-@ti.kernel
-def prepare(w: ti.template(), n: ti.i32, pieces: ti.i32, noise: ti.f64, weight: ti.f64):
-    """The matrix's diagonal; the size of load and weight (`weight` is gravity times dt).
+@ti.func
+def prepare(w: ti.template(), i: ti.i32, noise: ti.f64):
+    """The matrix's diagonal. Squares: load, what rounding leaves of it, mass.
 
     `noise` times the diagonal's size is what rounding leaves of the forces: a right-hand side below that
     is not worth resolving further.
     """
-    ti.loop_config(block_dim=1, serialize=ti.static(w.alone(120)))
-    for c in range(pieces):
-        sums = ti.Vector.zero(ti.f64, 3)
-        first, last = range_of(n, c, pieces)
-        for i in range(first, last):
-            d = w.own[i] + w.spring[i]
-            w.block[w.diagonal[i]] = d
-            w.inverse[i] = _inverse_diagonal(w, i, d)
-            stiff = (d.trace() - 3 * w.mass[i]) * w.free[i].sum() / 9
-            floor = ti.cast(noise, ti.f64) * ti.cast(stiff * w.x[i].norm(), ti.f64)
-            sums[0] += _impulse(w, i) * (1 - w.sprung[i])
-            sums[1] += floor**2
-            sums[2] += ti.cast(w.mass[i] * w.mass[i] * w.free[i].sum() / 3, ti.f64)
-        w.partial[c] = sums
-    ti.loop_config(serialize=True)
-    for _ in range(1):
-        sums = total(w, pieces)
-        w.scalar[LOAD] = ti.sqrt(sums[0])
-        w.scalar[NOISE] = ti.sqrt(sums[1])
-        w.scalar[WEIGHT] = ti.sqrt(sums[2]) * weight
-        w.scalar[ALPHA] = 0.0
-        w.scalar[RZ] = 0.0
-        w.scalar[DONE] = 0.0
-        w.scalar[COUNT] = -1.0
-        w.scalar[INDEFINITE] = 0.0
+    d = w.own[i] + w.spring[i]
+    w.block[w.diagonal[i]] = d
+    w.inverse[i] = _inverse_diagonal(w, i, d)
+    stiff = (d.trace() - 3 * w.mass[i]) * w.free[i].sum() / 9
+    floor = noise * ti.cast(stiff * w.x[i].norm(), ti.f64)
+    load = _impulse(w, i) * (1 - w.sprung[i])
+    return ti.Vector([load, floor**2, ti.cast(w.mass[i] * w.mass[i] * w.free[i].sum() / 3, ti.f64)])
+
+
+@ti.func
+def after_prepare(w: ti.template(), pieces: ti.i32, weight: ti.f64):
+    """The size of load and weight (`weight` is gravity times dt); nothing is done yet."""
+    sums = total(w, pieces)
+    w.scalar[LOAD] = ti.sqrt(sums[0])
+    w.scalar[NOISE] = ti.sqrt(sums[1])
+    w.scalar[WEIGHT] = ti.sqrt(sums[2]) * weight
+    w.scalar[ALPHA] = 0.0
+    w.scalar[RZ] = 0.0
+    w.scalar[COUNT] = -1.0
+    w.scalar[INDEFINITE] = 0.0
 
 
 @ti.func
@@ -98,17 +95,6 @@ def leave(w: ti.template(), i: ti.i32, product):
     w.residual[i] = w.free[i] * (w.load[i] + w.spring_load[i] - product)
     w.product[i] = ti.Vector.zero(w.real, 3)
     w.direction[i] = ti.Vector.zero(w.real, 3)
-
-
-@ti.kernel
-def begin(w: ti.template(), n: ti.i32, pieces: ti.i32):
-    """Start from `w.dv`."""
-    ti.loop_config(block_dim=1, serialize=ti.static(w.alone(60)))
-    for c in range(pieces):
-        first, last = range_of(n, c, pieces)
-        matrix.multiply(w, w.dv, w.product, first, last)
-        for i in range(first, last):
-            leave(w, i, w.product[i])
 
 
 @ti.func

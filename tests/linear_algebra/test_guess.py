@@ -5,7 +5,8 @@ import pytest
 
 import taichifem as tf
 from taichifem import transfer
-from taichifem.linear_algebra import guess, steps
+from taichifem.linear_algebra import crew, guess
+from taichifem.linear_algebra.steps import Limits
 from taichifem.structure.pattern import to_sparse
 from taichifem.world import MEMORY
 
@@ -30,7 +31,7 @@ def test_the_guess_is_the_best_combination_of_the_past():
         transfer.write(w, w.past, past)
         transfer.write(w, w.dv, held)
         transfer.write(w, w.load, load)
-        steps.prepare(w, n, pieces, 0.0, 0.0)
+        crew.run(w, n, simulation._plan.program.operations, Limits(0.0, 1), opening=(0, 1))
         guess.guess(w, n, pieces)
         dv, residual, free = (transfer.read(w, field, n) for field in (w.dv, w.residual, w.free))
         blocks = transfer.read(w, w.block, simulation._plan.pattern.n_blocks)
