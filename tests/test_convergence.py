@@ -60,7 +60,7 @@ def test_thick_ring_in_plane_strain(sizes, within):
     assert_towards(convergence.thick_ring(sizes, E=E, nu=nu, a=a, b=b, p=p), lame, within)
 
 
-@pytest.mark.parametrize(("sizes", "within"), [((1, 2), 0.37), pytest.param((1, 2, 4, 8), 0.05, marks=SLOW)])
+@pytest.mark.parametrize(("sizes", "within"), [((1, 2), 0.37), pytest.param((1, 2, 4, 8), 0.055, marks=SLOW)])
 def test_cantilever_approaches_timoshenko_from_below(oracles, sizes, within):
     beam = json.loads((oracles / "beams.json").read_text())["beams"][1]
     values = convergence.cantilever(
