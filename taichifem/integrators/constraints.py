@@ -60,13 +60,15 @@ def springs(step: Step, h: float, weight: float = 0.0) -> int:
     if not (acting or counts.sprung):
         return 0
     counts.sprung = acting
-    holding.clear_springs(w, counts.nodes)
-    holding.pull(w, counts.pulled, h)
-    if counts.meetings:
-        meeting_elements.push(w, counts.meetings, h)
     excess = 0
     if counts.colliders:
         excess += contact.touch(w, counts.nodes, counts.colliders, h, step.dt, weight, TOLERANCE)
+    else:
+        holding.clear_springs(w, counts.nodes)
+    if counts.pulled:
+        holding.pull(w, counts.pulled, h)
+    if counts.meetings:
+        meeting_elements.push(w, counts.meetings, h)
     if step.riding is not None:
         excess += step.riding.touch(w, counts, h, step.dt, weight, TOLERANCE)
     return excess

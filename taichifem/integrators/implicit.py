@@ -37,7 +37,7 @@ LOOSEST = 0.1
 NEAR = 0.1
 """Imbalance, relative to the forces at work, below which tangents are exact."""
 
-PASS = 10
+PASS = 6
 """Iterations of a solve with slack at most: the next one goes on from where it ends, with contacts renewed."""
 
 ALWAYS = 1e30

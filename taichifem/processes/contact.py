@@ -135,7 +135,8 @@ def _state(w: ti.template(), c: ti.i32, i: ti.i32, h, dt, velocity):
 def touch(
     w: ti.template(), n: ti.i32, n_colliders: ti.i32, h: ti.f64, dt: ti.f64, weight: ti.f64, share: ti.f64
 ) -> ti.i64:
-    """Add contact springs for the end velocity `w.v + w.dv` guessed so far; h is that of `integrators.implicit`.
+    """Set `w.spring` and `w.spring_load` to those of contact, for the end velocity `w.v + w.dv` guessed so far; h is
+    that of `integrators.implicit`.
 
     Returns the `excess` of the errors that those of the last call had, as contacts opened, closed or slipped since.
     """
@@ -144,6 +145,7 @@ def touch(
     for i in range(n):
         step, whole = ti.cast(h, w.real), ti.cast(dt, w.real)
         end = w.v[i] + w.dv[i]
+        spring, load, sprung = ti.Matrix.zero(w.real, 3, 3), ti.Vector.zero(w.real, 3), 0
         for c in range(n_colliders):
             state, force, normal, stretch = _state(w, c, i, step, whole, end)
             was = w.touching[c, i]
@@ -152,14 +154,14 @@ def touch(
                 springs, side = ti.Matrix.zero(w.real, 3, 3), ti.cast(0.0, w.real)
                 if state != NONE:
                     springs, side = springs_of(w, c, state, normal, stretch, k, pressed)
-                    w.sprung[i] = 1
+                    sprung = 1
+                    spring += step * step * springs
                     # Both forces are written for dv = 0: what `dv` adds to them stands in the matrix.
-                    push = step * (force * normal - side * stretch + step * (springs @ w.dv[i]))
-                    w.spring[i] = w.spring[i] + step * step * springs
-                    w.spring_load[i] = w.spring_load[i] + push
+                    load += step * (force * normal - side * stretch + step * (springs @ w.dv[i]))
                 wrong = wrong_by(w, c, was, state, force, stretch, side, w.grip[c, i], pressed)
                 total += excess(w, wrong, force, w.mass[i], weight, share)
                 w.touching[c, i], w.grip[c, i] = state, side
+        w.spring[i], w.spring_load[i], w.sprung[i] = spring, load, sprung
     return total
 
 

@@ -11,7 +11,7 @@ small, however they came to overlap; pieces that have just split touch everywher
 
 from taichifem.processes import contact
 from taichifem.runtime import ti
-from taichifem.world import World
+from taichifem.world import World, round_up
 
 RECOVERY = 0.2
 """Part of the depth of a node that its spring takes back in a step."""
@@ -28,10 +28,10 @@ GRAZING = 0.05
 
 
 @ti.func
-def _bucket(w: ti.template(), cell):
-    """Number of a cell in the hash (Teschner et al. 2003)."""
+def _bucket(cell, buckets: ti.i32):
+    """Number of a cell in the hash (Teschner et al. 2003); of `buckets` there is a power of two."""
     mixed = (cell[0] * 73856093) ^ (cell[1] * 19349663) ^ (cell[2] * 83492791)
-    return mixed & (w.bucket_start.shape[0] - 2)
+    return mixed & (buckets - 1)
 
 
 @ti.func
@@ -80,12 +80,12 @@ def _inside(w: ti.template(), e: ti.i32, point, margin):
 
 
 @ti.kernel
-def _look(w: ti.template(), n: ti.i32, m: ti.i32, dt: ti.f64, size: ti.f64):
+def _look(w: ti.template(), n: ti.i32, m: ti.i32, dt: ti.f64, size: ti.f64, buckets: ti.i32):
     """Which tetrahedron of another piece each node of a surface is about to enter: to `w.entered`, or m for none."""
     for i in range(n):
         w.z[i] = w.x[i] + ti.cast(dt, w.real) * w.v[i]
         w.entered[i] = m
-    for k in range(w.bucket_start.shape[0]):
+    for k in range(buckets + 1):
         w.bucket_start[k] = 0
         w.bucket_pieces[k] = ti.Vector([m, -1])
     inverse, margin = ti.cast(1 / size, w.real), ti.cast(MARGIN * size, w.real)
@@ -99,19 +99,19 @@ def _look(w: ti.template(), n: ti.i32, m: ti.i32, dt: ti.f64, size: ti.f64):
                     normal += outward
         w.outward[i] = normal.normalized(1e-30)
         if normal.norm_sqr() > 0:
-            k = _bucket(w, ti.floor(w.z[i] * inverse, ti.i32))
+            k = _bucket(ti.floor(w.z[i] * inverse, ti.i32), buckets)
             ti.atomic_add(w.bucket_start[k], 1)
             ti.atomic_min(w.bucket_pieces[k][0], _piece(w, i))
             ti.atomic_max(w.bucket_pieces[k][1], _piece(w, i))
     ti.loop_config(serialize=True)
     for _ in range(1):
         total = 0
-        for k in range(w.bucket_start.shape[0]):
+        for k in range(buckets + 1):
             total += w.bucket_start[k]
             w.bucket_start[k] = total
     for i in range(n):
         if w.outward[i].norm_sqr() > 0:
-            k = _bucket(w, ti.floor(w.z[i] * inverse, ti.i32))
+            k = _bucket(ti.floor(w.z[i] * inverse, ti.i32), buckets)
             w.bucket_node[ti.atomic_sub(w.bucket_start[k], 1) - 1] = i
     for e in range(m):
         low, high = _corner(w, e, 0), _corner(w, e, 0)
@@ -121,7 +121,7 @@ def _look(w: ti.template(), n: ti.i32, m: ti.i32, dt: ti.f64, size: ti.f64):
         # Numbers of cells end somewhere: what is farther away has diverged, and its differences wrap round.
         if ((high - low) * inverse).max() < 16 and ti.max(-low, high).max() * inverse < 1e9:
             for c in ti.grouped(ti.ndrange((first[0], last[0] + 1), (first[1], last[1] + 1), (first[2], last[2] + 1))):
-                k = _bucket(w, c)
+                k = _bucket(c, buckets)
                 there, own = w.bucket_pieces[k], w.piece[e]
                 if there[0] == there[1] and there[0] == own:
                     continue
@@ -227,6 +227,6 @@ def find(w: World, n: int, m: int, *, dt: float, size: float) -> int:
 
     size: of the cells of the grid [m].
     """
-    _look(w, n, m, dt, size)
+    _look(w, n, m, dt, size, 2 * round_up(n, 1))
     _gather(w, n, m, dt, size)
     return int(w.meetings[None])
