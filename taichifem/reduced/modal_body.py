@@ -16,10 +16,11 @@ from taichifem.errors import InputError
 from taichifem.layout import Group
 from taichifem.reduced.frames import DrivenFrame, FreeFrame
 from taichifem.reduced.grip import NOTHING, Grip
+from taichifem.reduced.modal_load import ModalLoad
 from taichifem.reduced.modal_skin import ClusteredSkin, Skin
 from taichifem.reduced.modes import Modes, lowest_modes
 from taichifem.reduced.oscillators import Oscillators
-from taichifem.reduced.parts import LoadField, Parts
+from taichifem.reduced.parts import Parts
 from taichifem.reduced.ritz import quadratic_fields, ritz_modes
 from taichifem.reduced.touching import Touch
 from taichifem.surroundings import pose
@@ -84,7 +85,7 @@ class ModalBody:
         self._youngs, self._frequencies = material.youngs, found.frequencies
         self._moment = np.einsum("n,nak->ak", parts.masses, self.shapes)
         self._tensor = np.einsum("n,nb,nak->abk", parts.masses, self.local, self.shapes)
-        self._loads = [_ModalLoad(load, self.shapes, self.local) for load in parts.loads]
+        self._loads = [ModalLoad(load, self.shapes, self.local) for load in parts.loads]
         self._handles = parts.handles
         self.touch = Touch()
         self.contacts = 0
@@ -256,27 +257,6 @@ class ModalBody:
     def _target(self, group: Group, time: float) -> np.ndarray:
         turn, shift = pose(group.motion, time)
         return self._rest[group.nodes] @ turn.T + shift
-
-
-class _ModalLoad:
-    """A load on the coordinates of a body: its forces keep their direction, or turn with the frame."""
-
-    def __init__(self, field: LoadField, shapes: np.ndarray, local: np.ndarray) -> None:
-        self.load, self._turns = field.load, field.turns
-        self._on_modes = np.einsum("nak,nb->abk", shapes, field.forces)
-        self._total = field.forces.sum(axis=0)
-        self._arms = local.T @ field.forces
-
-    def modal(self, rotation: np.ndarray) -> np.ndarray:
-        """Modal forces (k,)."""
-        turn = np.eye(3) if self._turns else rotation.T
-        return np.einsum("ab,abk->k", turn, self._on_modes)
-
-    def rigid(self, rotation: np.ndarray) -> np.ndarray:
-        """Force and torque (6,) about the origin of the frame."""
-        total = rotation @ self._total if self._turns else self._total
-        arms = rotation @ self._arms @ (rotation.T if self._turns else np.eye(3))
-        return np.concatenate([total, [arms[1, 2] - arms[2, 1], arms[2, 0] - arms[0, 2], arms[0, 1] - arms[1, 0]]])
 
 
 def _one_motion(parts: Parts):
