@@ -54,7 +54,7 @@ def test_uniaxial_path(oracles, law, case):
     simulation = stretched([row[0] for row in data["rows"]], steel)
     for axial_strain, axial_stress, plastic, accumulated in data["rows"]:
         simulation.step()
-        assert simulation.report.balanced
+        assert simulation.report.balanced and simulation.report.linearisations <= 15
         stress, flowed = simulation.cauchy_stress(), simulation.plastic_strain()
         assert stress[:, 0, 0] == pytest.approx(axial_stress * scale, rel=1e-6)
         assert abs(stress[:, 1:, 1:]).max() < 1e-6 * abs(axial_stress * scale)

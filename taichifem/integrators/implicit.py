@@ -29,6 +29,9 @@ from taichifem.runtime import ti
 OVERSHOOT = 0.9
 """Newton's correction is cut short where the imbalance along it has turned round and kept this part of its size."""
 
+UNDERSHOOT = 0.8
+"""A correction that was cut is made longer again while this part of the imbalance along it is left."""
+
 CUTS = 8
 
 LOOSEST = 0.1
@@ -214,16 +217,30 @@ def _linearise(step: Step, h: float, inertia: bool, *, first: bool = False, exac
 
 
 def _linearise_and_search(step: Step, h: float, inertia: bool, *, exact: bool) -> float:
-    """Linearise about the corrected state, and cut the correction where it overshoots; the part that stays."""
+    """Linearise about the corrected state, and cut the correction where it overshoots; the part that stays.
+
+    Cut too short, it is made longer again: where the tangent jumps (the corners of Tresca's law), the slope next to
+    the jump tells nothing of what lies beyond, and steps of a tenth would follow one another.
+    """
     w, n = step.w, step.counts.nodes
-    before, length = _slope(w, n), 1.0
-    for _ in range(CUTS):
+
+    def linearise() -> None:
         _linearise(step, h, inertia, exact=exact)
         springs(step, h)
+
+    before, length = _slope(w, n), 1.0
+    lower, below, upper, above = 0.0, before, 0.0, 0.0
+    linearise()
+    for _ in range(CUTS):
         after = _slope(w, n)
-        if after >= -OVERSHOOT * abs(before):
+        if after < -OVERSHOOT * abs(before):
+            upper, above = length, after
+        elif not upper or after <= UNDERSHOOT * before:
             break
-        shorter = length * min(0.5, max(0.1, before / (before - after)))
-        _shorten(w, n, h, length - shorter)
-        length = shorter
+        else:
+            lower, below = length, after
+        middle = lower + (upper - lower) * min(0.5, max(0.1, below / (below - above)))
+        _shorten(w, n, h, length - middle)
+        length = middle
+        linearise()
     return length
