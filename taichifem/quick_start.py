@@ -5,8 +5,8 @@ of every piece of syntax for error messages that are hardly ever printed. Here s
 is told in one plain line.
 
 It also works out anew at every launch which compiled kernel its arguments ask for, and how they are passed: some 40
-microseconds, twenty times a step. A kernel that takes an object with fields, and numbers else, is launched at once
-from its second call on.
+microseconds, and 20 more for every array. A kernel that takes objects with fields, NumPy's arrays and numbers, and
+returns at most a number, is launched at once when it has been called before with such arguments.
 
 Where another version of Taichi has these elsewhere, it stays as slow as it was.
 """
@@ -17,7 +17,9 @@ import ast
 import functools
 import weakref
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, field
+
+import numpy as np
 
 
 def quicken() -> None:
@@ -46,51 +48,113 @@ def _launching(call: Callable) -> Callable:
 
     @functools.wraps(call)
     def launch(kernel, *args, **keywords):
-        plans = kernel.__dict__.get("_plans", {})
-        plan = plans.get(args[0]) if plans else None
-        runtime = kernel.runtime
-        if plan is None or len(args) != len(plan.setters) + 1 or runtime.prog is not plan.program:
-            result = call(kernel, *args, **keywords)
-            _plan(kernel, args)
-            return result
+        runtime, slots = kernel.runtime, kernel.__dict__.get("_slots")
         if keywords or runtime.target_tape or runtime.fwd_mode_manager:
             return call(kernel, *args, **keywords)
+        key = slots.key(args) if slots else None
+        plan = slots.plans.get(key) if slots else None
+        if plan is None or plan.program is not runtime.prog:
+            result = call(kernel, *args)
+            if slots is None:
+                slots = kernel.__dict__["_slots"] = _slots_of(kernel, args)
+                key = slots.key(args)
+            if key is not None:
+                slots.plans[key] = _plan(kernel, args, slots, key)
+            return result
         context = plan.context()
-        for slot, put in enumerate(plan.setters):
-            getattr(context, put)((slot,), args[slot + 1])
+        for slot, k in slots.arrays:
+            array = args[k]
+            context.set_arg_external_array_with_shape((slot,), array.ctypes.data, array.nbytes, array.shape, 0)
+        for slot, k, put in slots.numbers:
+            getattr(context, put)((slot,), args[k])
         plan.program.launch_kernel(plan.compiled, context)
-        return None
+        if slots.returned is None:
+            return None
+        runtime.sync()
+        return getattr(context, slots.returned)((0,))
 
     return launch
 
 
 @dataclass(frozen=True)
 class _Plan:
-    """How a kernel is launched again for the same object: what makes its context, and sets the numbers there."""
+    """How a kernel is launched again for the same objects: what makes its context. alive: notices of their end."""
 
     program: object
     compiled: object
     context: Callable
-    setters: list[str]
+    alive: list[weakref.ref]
 
 
-def _plan(kernel, args: tuple) -> None:
-    """Remember how a kernel that was just called is launched again, unless its arguments are of other kinds."""
+@dataclass(frozen=True)
+class _Slots:
+    """Which of a kernel's arguments are what, by position, and its plans.
+
+    count: arguments; 0 if there cannot be plans.  objects, constants: templates that have fields, or are whole numbers.
+    arrays (slot, position), numbers (slot, position, what sets them): slots do not count templates.
+    returned: what reads the result.
+    """
+
+    count: int = 0
+    objects: list[int] = field(default_factory=list)
+    constants: list[int] = field(default_factory=list)
+    arrays: list[tuple[int, int]] = field(default_factory=list)
+    numbers: list[tuple[int, int, str]] = field(default_factory=list)
+    returned: str | None = None
+    plans: dict[tuple, _Plan] = field(default_factory=dict)
+
+    def key(self, args: tuple) -> tuple | None:
+        """What the compiled kernel depends on; None if Taichi has to look at the arguments."""
+        if not self.count or len(args) != self.count:
+            return None
+        key = [id(args[k]) for k in self.objects]
+        for k in self.constants:
+            if type(args[k]) is not int:
+                return None
+            key.append(args[k])
+        for _, k in self.arrays:
+            array = args[k]
+            if type(array) is not np.ndarray or not array.flags.c_contiguous:
+                return None
+            key += (array.dtype, array.ndim)
+        return tuple(key)
+
+
+def _slots_of(kernel, args: tuple) -> _Slots:
+    """What the arguments of a kernel that was just called are."""
     from taichi.lang import kernel_impl
-    from taichi.types import primitive_types, template
+    from taichi.lang.field import Field
+    from taichi.types import ndarray_type, primitive_types, template
 
-    if not args or len(args) != len(kernel.arguments) or not hasattr(args[0], "_data_oriented"):
-        return
-    first, *others = (argument.annotation for argument in kernel.arguments)
-    kinds = dict.fromkeys(primitive_types.real_type_ids, "set_arg_float")
-    kinds |= {id(kind): "set_arg_int" for kind in (primitive_types.i32, primitive_types.i64)}
-    setters = [kinds.get(id(kind)) for kind in others]
-    undifferentiated = kernel.autodiff_mode == kernel_impl.AutodiffMode.NONE
-    returns = kernel.return_type is not None or kernel.has_print
-    if None in setters or not isinstance(first, template) or returns or not undifferentiated:
-        return
+    putting = dict.fromkeys(primitive_types.real_type_ids, "set_arg_float")
+    getting = dict.fromkeys(primitive_types.real_type_ids, "get_struct_ret_float")
+    for kind in (primitive_types.i32, primitive_types.i64):
+        putting[id(kind)], getting[id(kind)] = "set_arg_int", "get_struct_ret_int"
+    returned = [getting.get(id(kind)) for kind in kernel.return_type or ()]
+    known = len(args) == len(kernel.arguments) and kernel.autodiff_mode == kernel_impl.AutodiffMode.NONE
+    if not known or kernel.has_print or len(returned) > 1 or None in returned:
+        return _Slots()
+    slots = _Slots(len(args), returned=returned[0] if returned else None)
+    for k, (argument, value) in enumerate(zip(kernel.arguments, args, strict=True)):
+        kind, slot = argument.annotation, len(slots.arrays) + len(slots.numbers)
+        if isinstance(kind, template) and (isinstance(value, Field) or hasattr(value, "_data_oriented")):
+            slots.objects.append(k)
+        elif isinstance(kind, template) and type(value) is int:
+            slots.constants.append(k)
+        elif isinstance(kind, ndarray_type.NdarrayType) and kind.dtype is None:
+            slots.arrays.append((slot, k))
+        elif id(kind) in putting:
+            slots.numbers.append((slot, k, putting[id(kind)]))
+        else:
+            return _Slots()
+    return slots
+
+
+def _plan(kernel, args: tuple, slots: _Slots, key: tuple) -> _Plan:
+    """Remember how a kernel that was just called is launched again."""
     of_arguments = kernel.compiled_kernels[kernel.ensure_compiled(*args)]
     program = kernel.runtime.prog
     compiled = program.compile_kernel(program.config(), program.get_device_caps(), of_arguments)
-    plans = kernel.__dict__.setdefault("_plans", weakref.WeakKeyDictionary())
-    plans[args[0]] = _Plan(program, compiled, of_arguments.make_launch_context, setters)
+    # Another object may come to have the place in memory of one that ended.
+    alive = [weakref.ref(args[k], lambda _: slots.plans.pop(key, None)) for k in slots.objects]
+    return _Plan(program, compiled, of_arguments.make_launch_context, alive)

@@ -52,3 +52,38 @@ def test_kernels_launched_again_see_their_object_and_numbers():
     assert [_doubled(second, 1), _doubled(second, 2)] == [20, 40]
     with pytest.raises(TypeError):
         _set(first, 1.5, 2.0)
+
+
+@ti.kernel
+def _added(numbers: ti.template(), times: ti.template(), array: ti.types.ndarray(), offset: ti.i32) -> ti.f64:
+    total = ti.cast(offset, ti.f64)
+    for k in range(array.shape[0]):
+        total += ti.cast(times * array[k], ti.f64)
+        array[k] = array[k] + 1
+    numbers.values[0] = total
+    return total
+
+
+def test_kernels_launched_again_see_their_arrays_and_constants():
+    start()
+    numbers = _Numbers()
+    for _ in range(3):
+        for kind in (np.float32, np.float64, np.int32):
+            array = np.array([1, 2, 3], dtype=kind)
+            assert _added(numbers, 2, array, 1) == 13 and array.tolist() == [2, 3, 4]
+            assert _added(numbers, 3, array[:2], 0) == 15 and array.tolist() == [3, 4, 4]
+            assert numbers.values[0] == 15
+            # Not in one piece: Taichi copies it, or says that it cannot.
+            with pytest.raises(ValueError, match="contiguous"):
+                _added(numbers, 3, array[::2], 0)
+    with pytest.raises(Exception, match="Invalid type"):
+        _added(numbers, 3, [1.0, 2.0], 0)
+
+
+def test_an_object_in_the_place_of_one_that_ended_is_another():
+    start()
+    for value in range(20):
+        numbers = _Numbers()
+        _set(numbers, 1, value)
+        assert numbers.values.to_numpy().tolist() == [0, value, 0, 0]
+        del numbers
