@@ -13,8 +13,10 @@ Scalars stay on the device in double precision; sums add fixed pieces in order, 
 import math
 from dataclasses import dataclass, replace
 
+import numpy as np
+
 from taichifem.errors import Diverged
-from taichifem.linear_algebra import balance, crew
+from taichifem.linear_algebra import balance, crew, steps
 from taichifem.linear_algebra.guess import guess
 from taichifem.linear_algebra.plan import Plan
 from taichifem.linear_algebra.program import READY, Program
@@ -83,45 +85,48 @@ def solve(
         if flying:
             balance.translate(w, flying, drag_factor)
     spent = 0
-    if galerkin is not None and not _iterate(w, n, program, limits, ready, plain=False):
-        spent, ready = int(w.scalar[COUNT]), 0
-        limits = replace(limits, most=max(max_iterations - spent, 1))
-    if galerkin is None or spent:
-        _iterate(w, n, program, limits, ready, plain=True)
+    told, helped = None, False
+    if galerkin is not None:
+        told, helped = _iterate(w, n, program, limits, ready, plain=False)
+        if not helped:
+            spent, ready = int(told[COUNT]), 0
+            limits = replace(limits, most=max(max_iterations - spent, 1))
+    if not helped:
+        told, _ = _iterate(w, n, program, limits, ready, plain=True)
     if flying:
         balance.translate(w, flying, drag_factor)
         balance.spin(w, n, counts.pieces, flying, drag_factor)
-    residual = w.scalar[RESIDUAL]
+    residual = float(told[RESIDUAL])
     if not math.isfinite(residual):
         raise Diverged("the solver met a number that is not finite: take smaller time steps, or start more gently")
     return Convergence(
-        spent + int(w.scalar[COUNT]),
+        spent + int(told[COUNT]),
         residual,
         residual <= tolerance * (1 + 1e-12),
-        w.scalar[SIZE],
-        w.scalar[NOISE],
-        w.scalar[INDEFINITE] == 0,
+        float(told[SIZE]),
+        float(told[NOISE]),
+        bool(told[INDEFINITE] == 0),
     )
 
 
-def _iterate(w: World, n: int, program: Program, limits: Limits, ready: int, *, plain: bool) -> bool:
+def _iterate(w: World, n: int, program: Program, limits: Limits, ready: int, *, plain: bool) -> tuple[np.ndarray, bool]:
     """Make ready, but for the first `ready` operations, and go on until the solve is done.
 
-    False if the levels do not help: then it can be done without. Splinters may be so stiff and light that single
-    precision leaves nothing of the matrices of their rigid motions.
+    Gives the numbers that tell of it (`steps.told`), and False if the levels do not help: then it can be done without.
+    Splinters may be so stiff and light that single precision leaves nothing of the matrices of their rigid motions.
     """
     begin, end = (program.plain, len(program.operations)) if plain else (program.cycle, program.plain)
     opening = (ready, READY if plain else program.cycle)
     rounds, idle, best = min(ROUNDS, (MOST_TURNS - opening[1]) // (end - begin)), 0, math.inf
     while True:
         crew.run(w, n, program.operations, limits, opening=opening, repeated=(begin, end), rounds=rounds)
-        opening = (0, 0)
-        residual = w.scalar[RESIDUAL]
-        if not plain and w.scalar[RZ] < 0:
-            return False
-        if w.scalar[DONE] or not math.isfinite(residual):
-            return True
+        opening, told = (0, 0), steps.told(w)
+        residual = told[RESIDUAL]
+        if not plain and told[RZ] < 0:
+            return told, False
+        if told[DONE] or not math.isfinite(residual):
+            return told, True
         idle = idle + rounds if residual > 0.5 * best else 0
         best = min(best, residual)
         if idle >= IDLE and not plain:
-            return False
+            return told, False

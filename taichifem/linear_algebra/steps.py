@@ -2,11 +2,14 @@
 
 from dataclasses import dataclass
 
+import numpy as np
+
 from taichifem.linear_algebra import multilevel
 from taichifem.runtime import ti
+from taichifem.world import World
 
 RZ, RESIDUAL, DONE, COUNT, ALPHA, BETA, LOAD, NOISE, WEIGHT, SIZE, INDEFINITE = range(11)
-"""Places in `World.scalar`."""
+"""Places in `World.scalar`, the last one last."""
 
 
 @dataclass(frozen=True)
@@ -141,3 +144,17 @@ def after_product(w: ti.template(), pieces: ti.i32):
     w.scalar[ALPHA] = w.scalar[RZ] / curvature if curvature > 0 and w.scalar[RZ] > 0 else 0.0
     if curvature < 0 or w.scalar[RZ] < 0:
         w.scalar[INDEFINITE] = 1.0
+
+
+@ti.kernel
+def _tell(w: ti.template(), numbers: ti.types.ndarray(ndim=1)):
+    ti.loop_config(serialize=True)
+    for k in range(numbers.shape[0]):
+        numbers[k] = w.scalar[k]
+
+
+def told(w: World) -> np.ndarray:
+    """The numbers in `World.scalar`, all at once: to ask for one takes as long."""
+    numbers = np.empty(INDEFINITE + 1)
+    _tell(w, numbers)
+    return numbers
