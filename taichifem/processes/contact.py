@@ -147,9 +147,10 @@ def touch(
         end = w.v[i] + w.dv[i]
         spring, load, sprung = ti.Matrix.zero(w.real, 3, 3), ti.Vector.zero(w.real, 3), 0
         for c in range(n_colliders):
-            state, force, normal, stretch = _state(w, c, i, step, whole, end)
             was = w.touching[c, i]
-            if state != NONE or was != NONE:
+            # Most nodes are far from everything: only how far is worked out for them.
+            if was != NONE or gap(w, c, w.x0[i], w.base_x[i] + step * end)[0] < 0:
+                state, force, normal, stretch = _state(w, c, i, step, whole, end)
                 k, pressed = stiffness(w, i, step), w.pressed[c, i]
                 springs, side = ti.Matrix.zero(w.real, 3, 3), ti.cast(0.0, w.real)
                 if state != NONE:
@@ -161,7 +162,8 @@ def touch(
                 wrong = wrong_by(w, c, was, state, force, stretch, side, w.grip[c, i], pressed)
                 total += excess(w, wrong, force, w.mass[i], weight, share)
                 w.touching[c, i], w.grip[c, i] = state, side
-        w.spring[i], w.spring_load[i], w.sprung[i] = spring, load, sprung
+        if sprung == 1 or w.sprung[i] == 1:
+            w.spring[i], w.spring_load[i], w.sprung[i] = spring, load, sprung
     return total
 
 
