@@ -31,8 +31,8 @@ def frames_of(normals: np.ndarray) -> np.ndarray:
 def _sweep(data: _array(), m: ti.i32, pulls: ti.i32) -> ti.i32:
     """Improve the forces f (m,3); returns how often. pulls: normal forces of either sign, friction at `most`.
 
-    data: rows of D (3m,3m), and behind them d (m,3), friction (m,), most (m,) and f: to hand an array over takes longer
-    than a sweep over some contacts.
+    data: rows of D (3m,3m), and behind them d (m,3), friction (m,), most (m,) and f: with an array of two dimensions a
+    sweep takes more than twice as long, to find its entries.
     """
     done = 0
     ti.loop_config(serialize=True)

@@ -17,7 +17,7 @@ COLUMNS = 35
 @ti.kernel
 def _gaps(data: _array(), n: ti.i32, colliders: ti.i32):
     """data: rows of the table (colliders,35), start and end of the points (2,n,3), and room for gaps and normals
-    (n,colliders,4), behind one another: every array that is handed over takes as long as the gaps of a thousand points.
+    (n,colliders,4), behind one another, as in `contact`.
     """
     # A few thousand points at most: to wake threads up takes longer.
     ti.loop_config(serialize=True)
@@ -55,15 +55,17 @@ class Obstacles:
         self.count = len(scene.colliders)
         self._scene = scene
         self.friction = np.array([collider.friction for collider in scene.colliders])
+        self._still = all(collider.motion is None for collider in scene.colliders)
         self._tables: dict[tuple[float, float], np.ndarray] = {}
 
     def table(self, time: float, dt: float) -> np.ndarray:
         """Where they stand at `time` [s], the end of a step of dt [s] (`surroundings.collider_table`)."""
-        if (time, dt) not in self._tables:
-            # A step looks at its beginning and at its end.
-            last = list(self._tables.items())[-1:]
-            self._tables = dict(last) | {(time, dt): collider_table(self._scene.colliders, time, dt)}
-        return self._tables[time, dt]
+        when = (0.0, dt) if self._still else (time, dt)
+        if when not in self._tables:
+            # A step looks at its beginning, which may be the end of the last one, and at its end.
+            last = list(self._tables.items())[-2:]
+            self._tables = dict(last) | {when: collider_table(self._scene.colliders, *when)}
+        return self._tables[when]
 
     def near(self, table: np.ndarray, before: np.ndarray, after: np.ndarray, radius: np.ndarray) -> np.ndarray:
         """May balls that go from `before` to `after` (n,3) meet a collider on their way (n,)? Errs to yes.

@@ -42,6 +42,7 @@ class Touch:
     def __init__(self) -> None:
         self.dissipated = 0.0
         self._near, self._close = np.zeros(0, dtype=int), None
+        self._known: tuple = ()
         self._clear()
 
     def state(self) -> dict[str, np.ndarray]:
@@ -81,13 +82,13 @@ class Touch:
         if not len(near):
             return alone
         if not np.array_equal(near, self._near) or self._close is None:
-            self._near, self._close = near, body.skin.all.part(near, body.skin.all.rows.dtype)
-        before = self._close.at(now)
+            self._near, self._close, self._known = near, body.skin.all.part(near, body.skin.all.rows.dtype), ()
+        before = self._places(now)
         contact, compliance, reached = np.zeros_like(push), body.compliance(dt), alone
         after = self._begin_with(*last, before, alone)
         for k in range(PASSES):
             if k or not len(self.points):
-                everywhere = self._close.at(reached)
+                everywhere = self._places(reached)
                 if not self._take(everywhere, *obstacles.gaps(self._table, before, everywhere)):
                     break
                 after = everywhere[self.points]
@@ -96,6 +97,13 @@ class Touch:
             contact = self._forces(now, before[self.points], after, acted, compliance, dt, time)
             reached = body.trial(dt, push + contact)
         return self._paid(body, push, contact, reached, alone, dt)
+
+    def _places(self, state) -> np.ndarray:
+        """Where the close points are (n,3) [m]. As a rule a step begins where the last one has looked at its end."""
+        depends = state.q, state.frame.rotation, state.frame.origin
+        if not self._known or any(a is not b for a, b in zip(depends, self._known[0], strict=True)):
+            self._known = depends, self._close.at(state)
+        return self._known[1]
 
     def _begin_with(self, points: np.ndarray, which: np.ndarray, forces: np.ndarray, before, alone) -> np.ndarray:
         """Contacts of the last step, by their numbers among all points, are the first to be looked at in this one:
