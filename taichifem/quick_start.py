@@ -6,7 +6,7 @@ is told in one plain line.
 
 It also works out anew at every launch which compiled kernel its arguments ask for, and how they are passed: some 40
 microseconds, and 20 more for every array. A kernel that takes objects with fields, NumPy's arrays and numbers, and
-returns at most a number, is launched at once when it has been called before with such arguments.
+returns at most a number, is launched at once when it has been called twice with such arguments.
 
 Where another version of Taichi has these elsewhere, it stays as slow as it was.
 """
@@ -53,13 +53,14 @@ def _launching(call: Callable) -> Callable:
             return call(kernel, *args, **keywords)
         key = slots.key(args) if slots else None
         plan = slots.plans.get(key) if slots else None
-        if plan is None or plan.program is not runtime.prog:
+        again = plan is not None and plan.program is runtime.prog
+        if not again or plan.compiled is None:
             result = call(kernel, *args)
             if slots is None:
                 slots = kernel.__dict__["_slots"] = _slots_of(kernel, args)
                 key = slots.key(args)
             if key is not None:
-                slots.plans[key] = _plan(kernel, args, slots, key)
+                slots.plans[key] = _plan(kernel, args, slots, key, again=again)
             return result
         context = plan.context()
         for slot, k in slots.arrays:
@@ -78,11 +79,14 @@ def _launching(call: Callable) -> Callable:
 
 @dataclass(frozen=True)
 class _Plan:
-    """How a kernel is launched again for the same objects: what makes its context. alive: notices of their end."""
+    """How a kernel is launched again for the same objects: what makes its context. alive: notices of their end.
+
+    compiled, context: None after the first call. Many a kernel has no other, and to ask for these takes milliseconds.
+    """
 
     program: object
-    compiled: object
-    context: Callable
+    compiled: object | None
+    context: Callable | None
     alive: list[weakref.ref]
 
 
@@ -150,11 +154,13 @@ def _slots_of(kernel, args: tuple) -> _Slots:
     return slots
 
 
-def _plan(kernel, args: tuple, slots: _Slots, key: tuple) -> _Plan:
-    """Remember how a kernel that was just called is launched again."""
-    of_arguments = kernel.compiled_kernels[kernel.ensure_compiled(*args)]
-    program = kernel.runtime.prog
-    compiled = program.compile_kernel(program.config(), program.get_device_caps(), of_arguments)
+def _plan(kernel, args: tuple, slots: _Slots, key: tuple, *, again: bool) -> _Plan:
+    """Remember how a kernel that was just called is launched again. again: had it been called so before?"""
     # Another object may come to have the place in memory of one that ended.
     alive = [weakref.ref(args[k], lambda _: slots.plans.pop(key, None)) for k in slots.objects]
-    return _Plan(program, compiled, of_arguments.make_launch_context, alive)
+    program, compiled, context = kernel.runtime.prog, None, None
+    if again:
+        of_arguments = kernel.compiled_kernels[kernel.ensure_compiled(*args)]
+        compiled = program.compile_kernel(program.config(), program.get_device_caps(), of_arguments)
+        context = of_arguments.make_launch_context
+    return _Plan(program, compiled, context, alive)
