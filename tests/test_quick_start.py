@@ -49,7 +49,7 @@ def test_kernels_launched_again_see_their_object_and_numbers():
     _set(first, 0, 5)
     assert first.values.to_numpy().tolist() == [5, 1, 2, 7]
     assert second.values.to_numpy().tolist() == [0, 10, 20, 0]
-    assert [_doubled(second, 1), _doubled(second, 2)] == [20, 40]
+    assert [_doubled(second, place) for place in (1, 2, 1, 2)] == [20, 40, 20, 40]
     with pytest.raises(TypeError):
         _set(first, 1.5, 2.0)
 
@@ -84,6 +84,7 @@ def test_an_object_in_the_place_of_one_that_ended_is_another():
     start()
     for value in range(20):
         numbers = _Numbers()
-        _set(numbers, 1, value)
-        assert numbers.values.to_numpy().tolist() == [0, value, 0, 0]
+        for place in range(3):  # launched at once from the third time on
+            _set(numbers, place, value)
+        assert numbers.values.to_numpy().tolist() == [value, value, value, 0]
         del numbers

@@ -149,7 +149,8 @@ def touch(
         for c in range(n_colliders):
             was = w.touching[c, i]
             # Most nodes are far from everything: only how far is worked out for them.
-            if was != NONE or gap(w, c, w.x0[i], w.base_x[i] + step * end)[0] < 0:
+            near = w.shielded[i] == 0 and gap(w, c, w.x0[i], w.base_x[i] + step * end)[0] < 0
+            if was != NONE or near:
                 state, force, normal, stretch = _state(w, c, i, step, whole, end)
                 k, pressed = stiffness(w, i, step), w.pressed[c, i]
                 springs, side = ti.Matrix.zero(w.real, 3, 3), ti.cast(0.0, w.real)

@@ -7,6 +7,7 @@ import pytest
 
 import taichifem as tf
 from taichifem.output.skin import Skin
+from taichifem.processes import contact
 
 SIDE = 0.3
 CUBE = tf.TetMesh.bar(size=(SIDE,) * 3, cells=(3, 3, 3))
@@ -48,6 +49,17 @@ def test_vertices_rest_and_sink_no_deeper_than_nodes(degrees):
         weight = 9.81 * simulation.masses.sum() * np.cos(np.radians(degrees))
         assert simulation._pressed_points(0)[1].sum() == pytest.approx(weight, rel=1e-3)
     assert 0 < depth[1] <= depth[0] < 2e-3 * SIDE
+
+
+def test_nodes_in_whose_place_a_surface_touches_do_not_count():
+    """They lie in the ground, and would vouch for other contacts that have not settled."""
+    body = tf.Body(mesh=CAGE, embed=surface(4), material=MATERIAL, position=(0, 0, 0.1 * SIDE))
+    simulation = tf.Simulation(tf.Scene(bodies=[body], colliders=[tf.PlaneCollider()], gravity=(0, 0, 0)))
+    simulation.step()
+    assert simulation.positions[:, 2].min() < -0.05 * SIDE
+    with simulation._kernels():
+        counts = simulation._counts
+        assert contact.touch(simulation._world, counts.nodes, 1, 1 / 60, 1 / 60, 1.0, 0.03) == 0
 
 
 def test_sliding_follows_coulomb():
