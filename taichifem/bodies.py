@@ -79,9 +79,7 @@ class Bodies:
         self._counts.pairs, self._counts.pieces = plan.pattern.n_pairs, plan.pattern.pieces
         with self._kernels():
             transfer.fill_pattern(self._world, plan.pattern)
-            transfer.fill_levels(
-                self._world, plan.pattern, plan.levels, self._layout.aggregates, plan.program.operations
-            )
+            transfer.fill_levels(self._world, plan, self._layout.aggregates)
         self._told = plan
 
     def _fill(self) -> None:

@@ -12,6 +12,7 @@ from taichifem.laws import Laws
 from taichifem.layout import Layout
 from taichifem.linear_algebra.plan import Plan
 from taichifem.linear_algebra.program import most_operations
+from taichifem.structure.elimination import most_changes
 from taichifem.structure.regrouping import MORE_LEVELS, most_aggregates
 from taichifem.world import Capacity
 
@@ -35,6 +36,7 @@ def room_for(scene: Scene, layout: Layout, laws: Laws, plan: Plan) -> Capacity:
         coarse_pairs=len(levels.pair),
         members=len(levels.member),
         operations=len(program.operations),
+        factor=most_changes(pattern.n_blocks),
         dimension=layout.dimension,
         tangents=laws.stores_tangents,
         springs=laws.springs,
@@ -59,6 +61,7 @@ def assert_room(capacity: Capacity, plan: Plan) -> None:
         "coarse_pairs": len(levels.pair),
         "members": len(levels.member),
         "operations": len(program.operations),
+        "factor": int(plan.elimination.start[-1]),
     }
     for name, count in needed.items():
         if count > getattr(capacity, name):
@@ -77,6 +80,7 @@ def _meeting(apart: Capacity, layout: Layout) -> Capacity:
         coarse_pairs=coarse,
         members=apart.members + 3 * springs * (layout.aggregates.levels + MORE_LEVELS),
         operations=most_operations(layout.aggregates.levels + MORE_LEVELS),
+        factor=most_changes(apart.blocks + 6 * springs),
         meetings=springs,
     )
 
@@ -104,4 +108,5 @@ def _broken(whole: Capacity, layout: Layout) -> Capacity:
         coarse_pairs=coarse_pairs,
         members=pairs + coarse_pairs,
         operations=most_operations(levels + MORE_LEVELS),
+        factor=most_changes(nodes * corners),
     )

@@ -1,11 +1,14 @@
-"""Between NumPy and the fields. Few kernels with many arguments: each costs a compilation at start-up."""
+"""Between NumPy and the fields. Few kernels with many arguments: each costs a compilation at start-up.
+
+What is written again whenever something splits or meets is copied by one thread: that takes less than waking others.
+"""
 
 import numpy as np
 
 from taichifem.layout import Layout
+from taichifem.linear_algebra.plan import Plan
 from taichifem.runtime import PRECISIONS, ti
 from taichifem.structure.aggregates import Aggregates
-from taichifem.structure.levels import Levels
 from taichifem.structure.pattern import BlockPattern
 from taichifem.world import MEMORY, World
 
@@ -71,13 +74,17 @@ def _fill_pattern(
     lower: _array(),
     diagonal: _array(),
 ):
+    ti.loop_config(serialize=ti.static(w.alone(0)))
     for i in range(pair_start.shape[0]):
         w.pair_start[i] = pair_start[i]
+    ti.loop_config(serialize=ti.static(w.alone(0)))
     for i in range(pair_entry.shape[0]):
         w.pair_entry[i] = pair_entry[i]
+    ti.loop_config(serialize=ti.static(w.alone(0)))
     for i in range(upper.shape[0]):
         w.upper[i] = upper[i]
         w.lower[i] = lower[i]
+    ti.loop_config(serialize=ti.static(w.alone(0)))
     for i in range(diagonal.shape[0]):
         w.diagonal[i] = diagonal[i]
 
@@ -97,40 +104,69 @@ def _fill_levels(
     member: _array(),
     own: _array(),
     operations: _array(),
+    eliminated: _array(),
+    factor_start: _array(),
+    factor_row: _array(),
+    factor_source: _array(),
+    factor_part: _array(),
 ):
+    ti.loop_config(serialize=ti.static(w.alone(0)))
     for i in range(row_start.shape[0]):
         w.row_start[i] = row_start[i]
         if i + 1 < row_start.shape[0]:
             w.near[i] = near[i] if i < near.shape[0] else row_start[i + 1]
+    ti.loop_config(serialize=ti.static(w.alone(0)))
     for i in range(column.shape[0]):
         w.column[i] = column[i]
+    ti.loop_config(serialize=ti.static(w.alone(0)))
     for i in range(parent.shape[0]):
         w.parent[i] = parent[i]
+    ti.loop_config(serialize=ti.static(w.alone(0)))
     for g in range(begin.shape[0]):
         w.child_begin[g] = begin[g]
         w.child_end[g] = end[g]
+    ti.loop_config(serialize=ti.static(w.alone(0)))
     for level in range(first.shape[0]):
         w.level_first[level] = first[level]
+    ti.loop_config(serialize=ti.static(w.alone(0)))
     for q in range(pair.shape[0]):
         for a in ti.static(range(4)):
             w.coarse_pair[q][a] = pair[q, a]
+    ti.loop_config(serialize=ti.static(w.alone(0)))
     for q in range(member_start.shape[0]):
         w.member_start[q] = member_start[q]
+    ti.loop_config(serialize=ti.static(w.alone(0)))
     for k in range(member.shape[0]):
         for a in ti.static(range(2)):
             w.member[k][a] = member[k, a]
+    ti.loop_config(serialize=ti.static(w.alone(0)))
     for g in range(own.shape[0]):
         w.own_block[g] = own[g]
+    ti.loop_config(serialize=ti.static(w.alone(0)))
     for k in range(operations.shape[0]):
         for a in ti.static(range(3)):
             w.operation[k][a] = operations[k, a]
+    ti.loop_config(serialize=ti.static(w.alone(0)))
+    for k in range(eliminated.shape[0]):
+        w.eliminated[k] = eliminated[k]
+        w.factor_start[k] = factor_start[k]
+        w.factor_start[k + 1] = factor_start[k + 1]
+    ti.loop_config(serialize=ti.static(w.alone(0)))
+    for p in range(factor_start[eliminated.shape[0]]):
+        w.factor_row[p] = factor_row[p]
+        w.factor_source[p] = factor_source[p]
+    ti.loop_config(serialize=ti.static(w.alone(0)))
+    for c in range(factor_part.shape[0]):
+        w.factor_part[c] = factor_part[c]
 
 
 @ti.kernel
 def _fill_table(w: ti.template(), table: _array(), body_start: _array(), body_flies: _array()):
+    ti.loop_config(serialize=ti.static(w.alone(0)))
     for i in range(table.shape[0]):
         for k in ti.static(range(w.table.n)):
             w.table[i][k] = table[i, k]
+    ti.loop_config(serialize=ti.static(w.alone(0)))
     for b in range(body_flies.shape[0]):
         w.body_start[b] = body_start[b]
         w.body_start[b + 1] = body_start[b + 1]
@@ -139,11 +175,13 @@ def _fill_table(w: ti.template(), table: _array(), body_start: _array(), body_fl
 
 @ti.kernel
 def _fill_groups(w: ti.template(), held: _array(), pulled: _array(), stiffness: _array()):
+    ti.loop_config(serialize=ti.static(w.alone(0)))
     for k in range(held.shape[0]):
         w.held_node[k] = held[k, 0]
         w.held_pose[k] = held[k, 1]
         for a in ti.static(range(3)):
             w.held_axes[k][a] = ti.cast(held[k, 2 + a], w.real)
+    ti.loop_config(serialize=ti.static(w.alone(0)))
     for k in range(pulled.shape[0]):
         w.pulled_node[k] = pulled[k, 0]
         w.pulled_pose[k] = pulled[k, 1]
@@ -152,6 +190,7 @@ def _fill_groups(w: ti.template(), held: _array(), pulled: _array(), stiffness: 
 
 @ti.kernel
 def _fill_poses(w: ti.template(), poses: _array()):
+    ti.loop_config(serialize=ti.static(w.alone(0)))
     for g in range(poses.shape[0]):
         for a in ti.static(range(3)):
             for b in ti.static(range(3)):
@@ -161,6 +200,7 @@ def _fill_poses(w: ti.template(), poses: _array()):
 
 @ti.kernel
 def _fill_colliders(w: ti.template(), rows: _array()):
+    ti.loop_config(serialize=ti.static(w.alone(0)))
     for c in range(rows.shape[0]):
         w.collider_kind[c] = ti.cast(rows[c, 0], ti.i32)
         w.collider_friction[c] = rows[c, 1]
@@ -233,15 +273,14 @@ def fill_pattern(w: World, pattern: BlockPattern) -> None:
     _fill_pattern(w, p.pair_start, p.pair_entry, p.upper, p.lower, p.diagonal)
 
 
-def fill_levels(
-    w: World, pattern: BlockPattern, levels: Levels, aggregates: Aggregates, operations: np.ndarray
-) -> None:
-    """The matrices of all levels of the solver, its aggregates, and its operations (k,3)."""
-    a = aggregates
+def fill_levels(w: World, plan: Plan, aggregates: Aggregates) -> None:
+    """The matrices of all levels of the solver, its aggregates, how a level is eliminated, and its operations."""
+    a, levels, e = aggregates, plan.levels, plan.elimination
     of_levels = levels.pair, levels.member_start, levels.member, levels.own
-    _fill_levels(
-        w, levels.row_start, levels.column, pattern.near, a.parent, a.begin, a.end, a.first, *of_levels, operations
-    )
+    of_factors = e.order, e.start, e.row, e.source, e.part
+    of_aggregates = a.parent, a.begin, a.end, a.first
+    matrices = levels.row_start, levels.column, plan.pattern.near
+    _fill_levels(w, *matrices, *of_aggregates, *of_levels, plan.program.operations, *of_factors)
 
 
 def fill_table(w: World, table: np.ndarray, body_start: np.ndarray, body_flies: np.ndarray) -> None:

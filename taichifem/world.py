@@ -18,9 +18,6 @@ from taichifem.structure.pattern import PIECES
 MOST_LEVELS = 12
 """Coarse levels of the solver at most: far more than memory would ever need."""
 
-DENSE = 96
-"""Rows of the last level at most, where it is solved directly."""
-
 SIDES = 8
 """Shares of an operation that threads begin with: one for each, up to this many."""
 
@@ -58,13 +55,14 @@ class Capacity:
     coarse_pairs: int = 1
     members: int = 1
     operations: int = 1
+    factor: int = 1  # blocks of the level that is solved directly
     meetings: int = 1  # springs between pieces
     dimension: int = 3  # of the elements: 3 for tetrahedra, 2 for triangles in the plane y = 0
     tangents: bool = False  # do elements store their stiffness blocks? Isotropic laws and springs need it
     springs: bool = False  # are there elements made of springs?
     plastic: bool = False  # are there plastic materials?
 
-    LEAST = (256, 1024, 4096, 2048, 8, 4, 512, 512, 256, 8, 32, 1024, 256, 1024, 64, 1)
+    LEAST = (256, 1024, 4096, 2048, 8, 4, 512, 512, 256, 8, 32, 1024, 256, 1024, 64, 512, 1)
 
     def rounded(self) -> Capacity:
         """The capacity class: every count rounded up to a power of two."""
@@ -137,8 +135,8 @@ class World:
         self._builder.dense(ti.i, size).place(field)
         return field
 
-    def _matrix(self, size: int, n: int, m: int):
-        field = ti.Matrix.field(n, m, self.real)
+    def _matrix(self, size: int, n: int, m: int, dtype=None):
+        field = ti.Matrix.field(n, m, dtype or self.real)
         self._builder.dense(ti.i, size).place(field)
         return field
 
@@ -228,8 +226,13 @@ class World:
         self.bare, self.sprung_on = self._matrix(3 * groups, 3, 3), self._matrix(3 * groups, 3, 3)
         # Where these blocks are, and their inverse: four blocks, shift and turn by shift and turn.
         self.own_block, self.own_inverse = self._scalar(groups, ti.i32), self._matrix(4 * groups, 3, 3)
-        # Inverse of the last level's matrix, and the diagonal that the matrix had.
-        self.last_inverse, self.pivot = self._scalar(DENSE * DENSE, ti.f64), self._scalar(DENSE, ti.f64)
+        # Of the level that is solved directly (`structure.elimination`, `linear_algebra.coarse_factor`).
+        self.eliminated, self.factor_start = self._scalar(groups, ti.i32), self._scalar(groups + 1, ti.i32)
+        self.factor_part = self._scalar(PIECES + 1, ti.i32)
+        rows = self.capacity.factor
+        self.factor_row, self.factor_source = self._scalar(rows, ti.i32), self._scalar(rows, ti.i32)
+        self.factor, self.pivot = (self._matrix(4 * k, 3, 3, ti.f64) for k in (rows, groups))
+        self.settled = self._vector(2 * groups, 3, ti.f64)
         # What a solve does, operation by operation: kind, level, number of pieces (`linear_algebra.program`).
         self.operation = self._vector(self.capacity.operations, 3, ti.i32)
         self.claimed, self.finished = ti.field(ti.i32), self._scalar(MOST_TURNS, ti.i32)

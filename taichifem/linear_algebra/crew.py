@@ -12,12 +12,12 @@ operation is a launch of its own, with the same code.
 import numpy as np
 
 from taichifem import runtime
-from taichifem.linear_algebra import coarse_inverses, coarse_springs, multilevel, steps
+from taichifem.linear_algebra import coarse_factor, coarse_inverses, coarse_springs, multilevel, steps
 from taichifem.linear_algebra import program as p
 from taichifem.linear_algebra.matrix import multiply
 from taichifem.linear_algebra.steps import Limits
 from taichifem.runtime import ti
-from taichifem.world import DENSE, SIDES, World
+from taichifem.world import SIDES, World
 
 
 @ti.func
@@ -50,8 +50,7 @@ def _perform(w: ti.template(), n: ti.i32, kind: ti.i32, level: ti.i32, c: ti.i32
         for item in range(begin, end):
             sums[0] += multilevel.smooth(w, n, level, item)
     elif kind == p.LAST:
-        whole = 6 * (w.level_first[level] - w.level_first[level - 1]) <= DENSE
-        multilevel.solve_last(w, n, level, whole)
+        coarse_factor.solve(w, n, c)
     elif kind == p.PLAIN:
         for i in range(begin, end):
             sums[0] += ti.cast(w.residual[i].dot(w.z[i]), ti.f64)
@@ -76,8 +75,8 @@ def _perform(w: ti.template(), n: ti.i32, kind: ti.i32, level: ti.i32, c: ti.i32
         for g in range(begin, end):
             coarse_springs.lean(w, n, level, g)
             coarse_inverses.invert_own(w, n, g)
-    elif kind == p.WHOLE:
-        coarse_inverses.invert_whole(w, n, first, first + items)
+    elif kind == p.FACTOR:
+        coarse_factor.factorise(w, n, c)
     w.partial[c] = sums
 
 

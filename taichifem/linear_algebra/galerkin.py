@@ -150,14 +150,15 @@ def _gather_level(w: ti.template(), n: ti.i32, level: ti.i32, first: ti.i32, end
 
 
 class Galerkin:
-    """Makes the coarse matrices of a world."""
+    """Makes the coarse matrices of a world, up to a level `last`."""
 
-    def __init__(self, aggregates: Aggregates, levels: Levels) -> None:
+    def __init__(self, aggregates: Aggregates, levels: Levels, last: int) -> None:
+        self._last = last
         self._n, self._first, self._pair = len(aggregates.order), aggregates.first.tolist(), levels.first_pair.tolist()
 
     def renew(self, w: World) -> None:
         """All coarse matrices, from `w.block` and `w.own` of the nodes at `w.relaxed`: still without springs."""
         n, first, pair = self._n, self._first, self._pair
         _gather_nodes(w, n, first[1], pair[1])
-        for level in range(2, len(first)):
+        for level in range(2, self._last + 1):
             _gather_level(w, n, level, first[level - 1], first[level], pair[level - 1], pair[level])

@@ -2,7 +2,8 @@
 
 A smoother deals with errors that change from node to node; what it leaves, large groups of nodes that move almost
 rigidly against each other, lies near the span Z of the aggregates' six rigid motions (Bulgakov 1993). The Galerkin
-matrix Z^T A Z is again a block matrix, so the same is done to it, until what is left can be inverted.
+matrix Z^T A Z is again a block matrix, so the same is done to it, until what is left can be solved directly
+(`coarse_factor`).
 
 Each function does one operation for one row, node or aggregate; `program` tells in which order they come.
 """
@@ -70,25 +71,3 @@ def smooth(w: ti.template(), n: ti.i32, level: ti.i32, item: ti.i32):
         s, t = _own(w, item, w.left[row], w.left[row + 1])
         w.z[row], w.z[row + 1] = w.z[row] + s, w.z[row + 1] + t
     return product
-
-
-@ti.func
-def solve_last(w: ti.template(), n: ti.i32, level: ti.i32, whole: ti.i32):
-    """The last level: with the inverse of the whole, or, where that would be too large, with those of each."""
-    first, end = w.level_first[level - 1], w.level_first[level]
-    for row in range(2 * (end - first)):
-        z = ti.Vector.zero(w.real, 3)
-        if whole:
-            total = ti.Vector.zero(ti.f64, 3)
-            for column in range(2 * (end - first)):
-                r = ti.cast(w.residual[n + 2 * first + column], ti.f64)
-                for a in ti.static(range(3)):
-                    at = (3 * row + a) * 6 * (end - first) + 3 * column
-                    for b in ti.static(range(3)):
-                        total[a] += w.last_inverse[at + b] * r[b]
-            z = ti.cast(total, w.real)
-        else:
-            g, half = first + row // 2, 2 * (row % 2)
-            z = w.own_inverse[4 * g + half] @ w.residual[n + 2 * g]
-            z += w.own_inverse[4 * g + half + 1] @ w.residual[n + 2 * g + 1]
-        w.z[n + 2 * first + row] = z

@@ -9,16 +9,19 @@ import numpy as np
 from taichifem.linear_algebra.galerkin import Galerkin
 from taichifem.linear_algebra.program import Program, write_program
 from taichifem.structure.aggregates import Aggregates
+from taichifem.structure.elimination import Elimination, plan_elimination
 from taichifem.structure.levels import Levels, stack_levels
 from taichifem.structure.pattern import BlockPattern, block_pattern
 
 
 @dataclass(frozen=True)
 class Plan:
-    """The blocks of the nodes and of all levels; the operations of a solve; what makes the coarse matrices."""
+    """The blocks of the nodes and of all levels; how one of these is solved directly; the operations of a solve; what
+    makes the coarse matrices."""
 
     pattern: BlockPattern
     levels: Levels
+    elimination: Elimination
     program: Program
     galerkin: Galerkin | None
 
@@ -30,5 +33,7 @@ def make_plan(cells: np.ndarray, n_nodes: int, aggregates: Aggregates, *, solver
     """
     pattern = block_pattern(cells, n_nodes)
     levels = stack_levels(pattern, aggregates)
-    program = write_program(pattern, aggregates, solver=solver, apart=levels.apart)
-    return Plan(pattern, levels, program, Galerkin(aggregates, levels) if solver == "multilevel" else None)
+    elimination = plan_elimination(pattern, levels, aggregates)
+    program = write_program(pattern, aggregates, elimination, solver=solver)
+    galerkin = Galerkin(aggregates, levels, elimination.level) if solver == "multilevel" else None
+    return Plan(pattern, levels, elimination, program, galerkin)

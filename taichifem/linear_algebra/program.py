@@ -10,11 +10,11 @@ from dataclasses import dataclass
 import numpy as np
 
 from taichifem.structure.aggregates import Aggregates
+from taichifem.structure.elimination import Elimination
 from taichifem.structure.pattern import BlockPattern, pieces_of
-from taichifem.world import DENSE
 
-ADVANCE, LEAVE, RESTRICT, CORRECT, SMOOTH, LAST, PLAIN, DIRECT, PRODUCT, PREPARE, BEGIN, LEAN, WHOLE = range(13)
-"""Kinds of operations; see `steps`, `multilevel` and `coarse_springs`."""
+ADVANCE, LEAVE, RESTRICT, CORRECT, SMOOTH, LAST, PLAIN, DIRECT, PRODUCT, PREPARE, BEGIN, LEAN, FACTOR = range(13)
+"""Kinds of operations; see `steps`, `multilevel`, `coarse_springs` and `coarse_factor`."""
 
 FEW = 150
 """Aggregates of a level that is worth a second visit above it."""
@@ -48,24 +48,22 @@ def most_operations(levels: int) -> int:
     return READY + levels + 1 + most + 3 + 4
 
 
-def write_program(pattern: BlockPattern, aggregates: Aggregates, *, solver: str, apart: bool) -> Program:
-    """The operations of a solve.
+def write_program(pattern: BlockPattern, aggregates: Aggregates, elimination: Elimination, *, solver: str) -> Program:
+    """The operations of a solve: levels up to the one that is eliminated.
 
-    solver: "multilevel" or "block-jacobi".  apart: has no aggregate of the last level a neighbour?
+    solver: "multilevel" or "block-jacobi".
     """
     n, fine = pattern.n_nodes, pattern.pieces
     counts = [n, *np.diff(aggregates.first).tolist()]
-    last = aggregates.levels
-    solved = apart or 6 * counts[last] <= DENSE
+    last, parts = elimination.level, len(elimination.part) - 1
 
     def visit(level: int) -> list[tuple[int, int, int]]:
         """Improve the solution of a level, whose first smoothing is done, by way of those above."""
         if level == last:
-            items = pieces_of(counts[last], ROWS)
-            return [(LAST, last, 1)] if solved else [(LEAVE, last, items), (SMOOTH, last, items)]
+            return [(LAST, last, parts)]
         # Twice, where what is above is not solved exactly: one visit leaves too much of long waves. But a level of
         # few aggregates costs as much to wait for as a large one.
-        visits = 1 if level == 0 or (level + 1 == last and solved) or counts[level] < FEW else 2
+        visits = 1 if level == 0 or level + 1 == last or counts[level] < FEW else 2
         items = fine if level == 0 else pieces_of(counts[level], ROWS)
         leave, up = (LEAVE, level, items), pieces_of(counts[level + 1], PARENTS)
         listing = []
@@ -77,7 +75,7 @@ def write_program(pattern: BlockPattern, aggregates: Aggregates, *, solver: str,
     ready, cycle = [(PREPARE, 0, fine), (BEGIN, 0, fine)], []
     if solver == "multilevel":
         ready += [(LEAN, level, pieces_of(counts[level], PARENTS)) for level in range(1, last + 1)]
-        ready += [(WHOLE, last, 1)] if 6 * counts[last] <= DENSE else []
+        ready += [(FACTOR, last, parts)]
         cycle = [first, *visit(0), *ending]
     operations = np.array([*ready, *cycle, first, (PLAIN, 0, fine), *ending], dtype=np.int32)
     return Program(operations, len(ready), len(ready) + len(cycle))

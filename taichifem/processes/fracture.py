@@ -136,6 +136,7 @@ def find_separation(w: ti.template(), n: ti.i32, n_elements: ti.i32):
 
 @ti.kernel
 def _read_normals(w: ti.template(), torn: ti.types.ndarray(ndim=1), normal: ti.types.ndarray(ndim=2)):
+    ti.loop_config(serialize=ti.static(w.alone(0)))
     for k in range(torn.shape[0]):
         across = elements.lifted(w.corner_force[torn[k] * w.corners], w)
         for a in ti.static(range(3)):
@@ -144,6 +145,7 @@ def _read_normals(w: ti.template(), torn: ti.types.ndarray(ndim=1), normal: ti.t
 
 @ti.kernel
 def _read_corners(w: ti.template(), nodes: ti.types.ndarray(ndim=1), corner: ti.types.ndarray(ndim=1)):
+    ti.loop_config(serialize=ti.static(w.alone(0)))
     for k in range(nodes.shape[0]):
         corner[k] = w.incident[w.incident_start[nodes[k]]]
 

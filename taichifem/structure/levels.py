@@ -35,12 +35,6 @@ class Levels:
     member: np.ndarray
     own: np.ndarray
 
-    @property
-    def apart(self) -> bool:
-        """Has no aggregate of the last level a neighbour? Then their own matrices are all there is."""
-        g, o = self.pair[self.first_pair[-2] :, :2].T
-        return bool((g == o).all())
-
 
 def stack_levels(pattern: BlockPattern, aggregates: Aggregates) -> Levels:
     """Add the Galerkin matrices of the aggregates below the matrix of the nodes."""

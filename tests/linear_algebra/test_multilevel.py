@@ -6,8 +6,10 @@ import scipy.sparse.linalg
 
 import taichifem as tf
 from taichifem import transfer
-from taichifem.linear_algebra import crew
+from taichifem.linear_algebra import crew, program
 from taichifem.linear_algebra.galerkin import relax
+from taichifem.linear_algebra.steps import Limits
+from taichifem.structure import elimination
 
 SIZE, CELLS = (1.0, 0.25, 0.25), (20, 5, 5)
 HELD = tf.BoxRegion(lower=(-1, -1, -1), upper=(1e-6, 1, 1))
@@ -110,14 +112,38 @@ def coarse_matrix(simulation, level=1):
 
 @pytest.mark.parametrize("level", [1, 2])
 @pytest.mark.parametrize("ground", [False, True])
-def test_the_coarse_matrices_are_those_of_the_rigid_motions_of_aggregates(level, ground):
+def test_the_coarse_matrices_are_those_of_the_rigid_motions_of_aggregates(monkeypatch, level, ground):
     """On the ground, the last solve of several has changed the springs only."""
+    if level == 2:
+        monkeypatch.setattr(elimination, "most_changes", lambda blocks: 0)
     colliders = [tf.PlaneCollider(friction=0.5)] if ground else []
     simulation = tf.Simulation(tf.Scene(bodies=[bar()], colliders=colliders), precision="f64")
     simulation.step()
-    assert simulation._layout.aggregates.levels >= level and (simulation.report.contact_passes > 1) == ground
+    assert simulation._plan.elimination.level == level and (simulation.report.contact_passes > 1) == ground
     gathered, expected = coarse_matrix(simulation, level)
     assert gathered == pytest.approx(expected, abs=1e-12 * abs(expected).max())
+
+
+@pytest.mark.parametrize("bodies", [1, 3])
+def test_the_level_that_is_eliminated_is_solved(bodies):
+    several = [bar(10.0 ** (6 + k), position=(0, 0.3 * k, 0)) for k in range(bodies)]
+    simulation = tf.Simulation(tf.Scene(bodies=several), precision="f64")
+    simulation.step()
+    w, n, plan = simulation._world, simulation._counts.nodes, simulation._plan
+    last, operations = plan.elimination, plan.program.operations
+    rows = slice(n + 2 * int(last.order.min()), n + 2 * int(last.order.max()) + 2)
+    matrix, _ = coarse_matrix(simulation, last.level)
+    right = np.random.default_rng(0).normal(size=(rows.stop - rows.start, 3))
+    at = int(np.flatnonzero(operations[:, 0] == program.LAST)[0])
+    assert len(last.order) > 10 and (operations[at, 2] > 1) == (bodies > 1), "in parts"
+    with simulation._kernels():
+        before = transfer.read(w, w.residual, rows.stop)
+        before[rows] = right
+        transfer.write(w, w.residual, before)
+        crew.run(w, n, operations, Limits(0.0, 1), opening=(at, at + 1))
+        found = transfer.read(w, w.z, rows.stop)[rows]
+    exact = np.linalg.solve(matrix, right.ravel())
+    assert np.linalg.norm(found.ravel() - exact) < 1e-7 * np.linalg.norm(exact)
 
 
 @pytest.mark.parametrize("model", ["linear", "corotational", "stvk"])
