@@ -37,6 +37,7 @@ def room_for(scene: Scene, layout: Layout, laws: Laws, plan: Plan) -> Capacity:
         members=len(levels.member),
         operations=len(program.operations),
         factor=most_changes(pattern.n_blocks),
+        usual=len(layout.rest),
         dimension=layout.dimension,
         tangents=laws.stores_tangents,
         springs=laws.springs,

@@ -52,15 +52,19 @@ def _fill_elements(w: ti.template(), indices: _array(), gradients: _array(), vol
 
 @ti.kernel
 def _fill_mesh(w: ti.template(), rest: _array(), cells: _array(), incident_start: _array(), incident: _array()):
+    ti.loop_config(serialize=ti.static(w.alone(0)))
     for i in range(rest.shape[0]):
         for k in ti.static(range(3)):
             w.rest[i][k] = rest[i, k]
         w.shielded[i] = 0
+    ti.loop_config(serialize=ti.static(w.alone(0)))
     for e in range(cells.shape[0]):
         for a in ti.static(range(w.corners)):
             w.cell[e][a] = cells[e, a]
+    ti.loop_config(serialize=ti.static(w.alone(0)))
     for i in range(incident_start.shape[0]):
         w.incident_start[i] = incident_start[i]
+    ti.loop_config(serialize=ti.static(w.alone(0)))
     for i in range(incident.shape[0]):
         w.incident[i] = incident[i]
 

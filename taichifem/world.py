@@ -21,7 +21,7 @@ MOST_LEVELS = 12
 SIDES = 8
 """Shares of an operation that threads begin with: one for each, up to this many."""
 
-WAKING = 80_000
+WAKING = 100_000
 """Work [ns] that is not worth waking other threads for."""
 
 MEMORY = 3
@@ -56,13 +56,14 @@ class Capacity:
     members: int = 1
     operations: int = 1
     factor: int = 1  # blocks of the level that is solved directly
+    usual: int = 1  # nodes while little is broken
     meetings: int = 1  # springs between pieces
     dimension: int = 3  # of the elements: 3 for tetrahedra, 2 for triangles in the plane y = 0
     tangents: bool = False  # do elements store their stiffness blocks? Isotropic laws and springs need it
     springs: bool = False  # are there elements made of springs?
     plastic: bool = False  # are there plastic materials?
 
-    LEAST = (256, 1024, 4096, 2048, 8, 4, 512, 512, 256, 8, 32, 1024, 256, 1024, 64, 512, 1)
+    LEAST = (256, 1024, 4096, 2048, 8, 4, 512, 512, 256, 8, 32, 1024, 256, 1024, 64, 512, 256, 1)
 
     def rounded(self) -> Capacity:
         """The capacity class: every count rounded up to a power of two."""
@@ -123,7 +124,7 @@ class World:
 
     def alone(self, cost: float) -> bool:
         """Is a loop over all nodes best left to one thread, at about `cost` [ns] a node?"""
-        return runtime.running_arch() == "cpu" and (runtime.threads() == 1 or self.capacity.nodes * cost < WAKING)
+        return runtime.running_arch() == "cpu" and (runtime.threads() == 1 or self.capacity.usual * cost < WAKING)
 
     def _scalar(self, size: int, dtype=None):
         field = ti.field(dtype or self.real)

@@ -82,9 +82,11 @@ def _inside(w: ti.template(), e: ti.i32, point, margin):
 @ti.kernel
 def _look(w: ti.template(), n: ti.i32, m: ti.i32, dt: ti.f64, size: ti.f64, buckets: ti.i32):
     """Which tetrahedron of another piece each node of a surface is about to enter: to `w.entered`, or m for none."""
+    ti.loop_config(serialize=ti.static(w.alone(5)))
     for i in range(n):
         w.z[i] = w.x[i] + ti.cast(dt, w.real) * w.v[i]
         w.entered[i] = m
+    ti.loop_config(serialize=ti.static(w.alone(5)))
     for k in range(buckets + 1):
         w.bucket_start[k] = 0
         w.bucket_pieces[k] = ti.Vector([m, -1])
