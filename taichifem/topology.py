@@ -7,6 +7,7 @@ from dataclasses import replace
 import numpy as np
 
 from taichifem.layout import Group, Layout, LoadGroup, place_in
+from taichifem.structure.pattern import order_of
 from taichifem.structure.regrouping import regroup
 
 
@@ -19,7 +20,7 @@ def split_layout(layout: Layout, cells: np.ndarray, origin: np.ndarray, piece: n
     they were, and nodes come piece by piece, as their aggregates do.
     """
     old = layout.node_number[origin]
-    sorted_by_old = np.argsort(old, kind="stable")
+    sorted_by_old = order_of(old)
     placed, old = place_in(sorted_by_old)[cells[layout.cell_order]], old[sorted_by_old]
     aggregates, piece_start = regroup(placed, layout.node_bodies[old], piece[sorted_by_old], layout.aggregates.levels)
     node_order, node_from = sorted_by_old[aggregates.order], old[aggregates.order]

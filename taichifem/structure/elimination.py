@@ -9,7 +9,7 @@ import numpy as np
 from taichifem.structure.aggregates import Aggregates
 from taichifem.structure.elimination_kernels import eliminate
 from taichifem.structure.levels import Levels
-from taichifem.structure.pattern import BlockPattern, piece_starts, pieces_of, starts_of
+from taichifem.structure.pattern import BlockPattern, order_of, piece_starts, pieces_of, starts_of
 from taichifem.structure.pieces import label_pieces
 
 WORTH = 8
@@ -81,7 +81,7 @@ def _eliminate(levels: Levels, aggregates: Aggregates, level: int, most: int) ->
     sizes = np.bincount(home_of)
     if sizes.max() > LARGEST:
         return None
-    home, by_home = starts_of(sizes), np.argsort(home_of, kind="stable").astype(of)
+    home, by_home = starts_of(sizes), order_of(home_of).astype(of)
     local = np.empty(count, dtype=of)
     local[by_home] = np.arange(count) - np.repeat(home[:-1], sizes)
     begins = np.r_[np.flatnonzero(pairs[:, 0] == pairs[:, 1]), len(pairs)].astype(of)

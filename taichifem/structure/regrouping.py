@@ -8,7 +8,7 @@ import numpy as np
 
 from taichifem.runtime import ti
 from taichifem.structure.aggregates import BRANCHES, SIZE, TOP, Aggregates
-from taichifem.structure.pattern import corners_at
+from taichifem.structure.pattern import corners_at, order_of
 
 CRUMB = SIZE // 4
 """Nodes below which what is left between aggregates goes to the neighbour that it has most links with."""
@@ -138,7 +138,7 @@ def regroup(cells: np.ndarray, body: np.ndarray, piece: np.ndarray, levels: int)
     start, incident = corners_at(cells, n)
     item, count, labels = np.arange(n, dtype=of), n, []
     for level in range(levels + MORE_LEVELS):
-        node_of = np.argsort(item, kind="stable").astype(of)
+        node_of = order_of(item).astype(of)
         nodes = np.bincount(item)
         item_start = np.r_[0, np.cumsum(nodes)].astype(of)
         label, found = np.full(count, -1, dtype=of), np.zeros(1, dtype=of)
@@ -175,7 +175,7 @@ def _number(labels: list[np.ndarray], piece: np.ndarray, body: np.ndarray) -> tu
         belongs[label], lead[label] = place[above], piece
         place, above = np.empty(k, dtype=np.int64), label
         place[np.lexsort((lead, belongs))] = np.arange(k)
-    order = np.argsort(place[above], kind="stable")
+    order = order_of(place[above])
     first, begin, end, parent, below = [0], [], [], [], np.arange(n)
     for label in labels:
         starts = np.flatnonzero(np.r_[True, np.diff(label[order]) != 0])

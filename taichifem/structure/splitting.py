@@ -48,6 +48,8 @@ class Splitting:
         self._counters = np.zeros(4, dtype=np.int32)
         self._mark, self._side = np.zeros(len(cells), dtype=np.int32), np.zeros(len(cells), dtype=np.int32)
         self._lists = np.empty((5, cells.size), dtype=np.int32)
+        # Room for where vertices are, and for what they are copies of: to make it anew takes as long as a tear.
+        self._where, self._parent = np.zeros((room, 3)), np.zeros(room, dtype=np.int32)
 
     @property
     def origin(self) -> np.ndarray:
@@ -76,10 +78,8 @@ class Splitting:
         vertex that was split waits: its stress is another one now.
         """
         of, before = np.int32, self._n
-        parent = np.zeros(len(self._origin), dtype=of)
-        parent[:before] = np.arange(before)
-        where = np.zeros((len(self._origin), 3))
-        where[:before] = x
+        self._parent[:before] = np.arange(before)
+        self._where[:before] = x
         self._counters[:SPLITS] = before, self._counters[STAMP]
         self._counters[SPLITS:] = 0
         with runtime.precision_of("f64"):
@@ -88,9 +88,9 @@ class Splitting:
                 self.cells.reshape(-1),
                 self.beside.reshape(-1),
                 self._origin,
-                parent,
+                self._parent,
                 self._tips,
-                where,
+                self._where,
                 np.ascontiguousarray(elements, dtype=of),
                 np.ascontiguousarray(corners, dtype=of),
                 np.ascontiguousarray(normals, dtype=np.float64),
@@ -103,4 +103,4 @@ class Splitting:
                 most,
             )
         self._n = int(self._counters[ADDED])
-        return Tear(int(self._counters[SPLITS]), bool(self._counters[CAPPED]), parent[: self._n])
+        return Tear(int(self._counters[SPLITS]), bool(self._counters[CAPPED]), self._parent[: self._n].copy())
