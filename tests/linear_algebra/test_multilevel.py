@@ -124,10 +124,15 @@ def test_the_coarse_matrices_are_those_of_the_rigid_motions_of_aggregates(monkey
     assert gathered == pytest.approx(expected, abs=1e-12 * abs(expected).max())
 
 
-@pytest.mark.parametrize("bodies", [1, 3])
+@pytest.mark.parametrize("bodies", [1, 3, "a strip that flies"])
 def test_the_level_that_is_eliminated_is_solved(bodies):
-    several = [bar(10.0 ** (6 + k), position=(0, 0.3 * k, 0)) for k in range(bodies)]
-    simulation = tf.Simulation(tf.Scene(bodies=several), precision="f64")
+    """Errors of round-off must not grow from one aggregate to the next, along the strip."""
+    if strip := isinstance(bodies, str):
+        mesh, glass = tf.TetMesh.bar(size=(1.8, 0.04, 0.04), cells=(90, 2, 2)), tf.Material(youngs=5e7, poisson=0.25)
+        several, bodies = [tf.Body(mesh=mesh, material=glass)], 1
+    else:
+        several = [bar(10.0 ** (6 + k), position=(0, 0.3 * k, 0)) for k in range(bodies)]
+    simulation = tf.Simulation(tf.Scene(bodies=several, fps=30), precision="f64")
     simulation.step()
     w, n, plan = simulation._world, simulation._counts.nodes, simulation._plan
     last, operations = plan.elimination, plan.program.operations
@@ -143,7 +148,7 @@ def test_the_level_that_is_eliminated_is_solved(bodies):
         crew.run(w, n, operations, Limits(0.0, 1), opening=(at, at + 1))
         found = transfer.read(w, w.z, rows.stop)[rows]
     exact = np.linalg.solve(matrix, right.ravel())
-    assert np.linalg.norm(found.ravel() - exact) < 1e-7 * np.linalg.norm(exact)
+    assert np.linalg.norm(found.ravel() - exact) < (1e-5 if strip else 1e-7) * np.linalg.norm(exact)
 
 
 @pytest.mark.parametrize("model", ["linear", "corotational", "stvk"])
