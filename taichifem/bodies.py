@@ -17,6 +17,7 @@ from taichifem.laws import Laws
 from taichifem.layout import Layout, lay_out
 from taichifem.linear_algebra import balance
 from taichifem.linear_algebra.plan import Plan, make_plan
+from taichifem.linear_algebra.telling import tell
 from taichifem.processes.loading import Loading
 from taichifem.room import assert_room, room_for
 from taichifem.structure.pattern import corners_at
@@ -78,8 +79,7 @@ class Bodies:
         assert_room(self._world.capacity, plan)
         self._counts.pairs, self._counts.pieces = plan.pattern.n_pairs, plan.pattern.pieces
         with self._kernels():
-            transfer.fill_pattern(self._world, plan.pattern)
-            transfer.fill_levels(self._world, plan, self._layout.aggregates)
+            tell(self._world, plan, self._layout.aggregates)
         self._told = plan
 
     def _fill(self) -> None:
